@@ -547,10 +547,11 @@ fn the_cornell_box_has_no_plateau() {
     has_no_plateau("cornell", 0.1, &traced::CORNELL);
 }
 
-/// In the dark corners too.
+/// In the dark corners too. Twice the paths that the default error asks for: their noise is taken off as far as it is known, and what it is known
+/// to must be less than .3 %.
 #[test]
 fn two_rooms_have_no_plateau() {
-    has_no_plateau("two-rooms", 0.05, &traced::of("two-rooms", 1 << 18));
+    has_no_plateau("two-rooms", 0.05, &traced::of("two-rooms", 1 << 18, 0.35));
 }
 
 /// Away from edges illuminance is off by less than 1 % of its mean by default and .3 % when `asked` (RMS), and colour

@@ -3,7 +3,7 @@
 use crate::common;
 use crate::common::built;
 
-use built::{Room, baked, baked_to, close, sphere};
+use built::{Room, baked, baked_to, close, glanced, sphere};
 use glam::{DVec3, dvec3};
 use haarlight::audit::{PathReference, Report};
 use haarlight::keep::Relighter;
@@ -68,6 +68,45 @@ fn two_slabs_exchange_light_through_a_sheet() {
             0.005,
             "lamp",
         );
+    }
+}
+
+/// A sheet of two leaves stands on a floor that the sun lights behind it, and points stand close before it: in the first round too they find the
+/// light of the places that they see. By the leaves alone all have nearly the same.
+#[test]
+fn points_close_to_a_sheet_see_what_passes_there() {
+    let (through, rho, sun, side) = (0.6, 0.9, 1000.0, 3.0);
+    let mut room = Room::new();
+    let sheet = room.sheet(even(0.0), even(0.0), even(through));
+    let (width, height) = (DVec3::X * side, DVec3::Y * side);
+    room.quad(DVec3::ZERO, width, height, sheet);
+    let floor = room.paint(rho);
+    room.quad(DVec3::NEG_Z * side, DVec3::Z * side, width, floor);
+    crowd(&mut room);
+    room.punctual(LightKind::Directional, DVec3::ZERO, DVec3::NEG_Y, sun);
+    let bake = glanced(room.scene());
+    // Factor from a place at a height above the edge of a rectangle as deep as `side`, standing upright, to the part on one side of it
+    // (Howell, A Catalog of Radiation Heat Transfer Configuration Factors, B-5).
+    let half = |height: f64, width: f64| {
+        let far = height.hypot(side);
+        ((width / height).atan() - height / far * (width / far).atan()) / (2.0 * PI)
+    };
+    // Irradiance by the front of the sheet, by small squares.
+    let of_sheet = |point: DVec3| {
+        let n = 300;
+        let places = (0..n * n).map(|k| {
+            let at = |k: usize| side * (k as f64 + 0.5) / n as f64;
+            let x = dvec3(at(k % n), at(k / n), 0.0);
+            let lit = rho * sun * (half(x.y, x.x) + half(x.y, side - x.x));
+            let way = point - x;
+            through * lit / PI * (way.z / way.length_squared()).powi(2)
+        });
+        places.sum::<f64>() * (side / n as f64).powi(2)
+    };
+    for height in [0.3, 0.9, 1.5, 2.1, 2.7] {
+        let point = dvec3(1.7, height, 0.06);
+        let seen = lux(&bake, point, DVec3::NEG_Z);
+        close(seen, of_sheet(point), 0.05, "before the sheet");
     }
 }
 

@@ -29,14 +29,10 @@ impl Descent {
     /// For a whole hierarchy.
     pub(crate) fn new(tree: &Tree) -> Self {
         let whole = |&id: &u32| id != NONE && tree.node(id).faces.1 <= POLYGONS;
-        let steps = (0_u32..).zip(&tree.nodes).map(|(k, node)| Step {
+        let steps = tree.nodes.iter().map(|node| Step {
             child: node.child,
             above: Some(node.parent).filter(whole).unwrap_or(NONE),
-            // Light that passes a sheet does not come from what the point on this side can see.
-            near: match tree.behind(k) {
-                NONE => (NEAR * node.area.sqrt()) as f32,
-                _ => 0.0,
-            },
+            near: (NEAR * node.area.sqrt()) as f32,
         });
         Self {
             steps: steps.collect(),

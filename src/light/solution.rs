@@ -35,6 +35,9 @@ pub struct Light {
     pub deviation: Vec<f32>,
     /// Brightness of the light that arrives on every node that is a leaf, share of the white's; 0 elsewhere.
     pub arrival: Vec<f32>,
+    /// Of nodes that are leaves of sheets: the brightness of the light that arrives on the side itself, and the share of what it sends that comes
+    /// from behind. Empty in a room without sheets.
+    pub sides: Vec<[f32; 2]>,
     /// The hierarchy as rays need it.
     pub descent: Descent,
     /// For each node the first node, itself or below, that is an emitting element or has several children with emission below;
@@ -78,6 +81,7 @@ impl Light {
         ];
         rows.iter().map(|rows| rows.bytes()).sum::<usize>()
             + scalars.iter().map(|list| 4 * list.len()).sum::<usize>()
+            + 8 * self.sides.len()
             + self.descent.bytes()
             + self.through.bytes()
             + self.fixtures.bytes()

@@ -15,6 +15,8 @@ pub struct Through {
     own: Rows,
     /// `tau / s`.
     across: Rows,
+    /// Irradiance of the side itself, by pair, in the last solution.
+    pub(crate) met: Rows,
 }
 
 impl Through {
@@ -31,7 +33,12 @@ impl Through {
                 };
             }
         }
-        Self { pairs, own, across }
+        Self {
+            pairs,
+            own,
+            across,
+            met: Rows::default(),
+        }
     }
 
     /// Are there sheets?
@@ -46,19 +53,49 @@ impl Through {
         k.ok().map(|k| [self.own.row(k), self.across.row(k)])
     }
 
-    /// Irradiance by leaf, for sheets as shown.
-    pub(crate) fn shown(&self, mut irradiance: Rows) -> Rows {
-        let met = irradiance.clone();
-        for (k, [place, behind]) in self.pairs.iter().map(|p| p.map(|x| x as usize)).enumerate() {
+    /// Irradiance by leaf, for sheets as shown; that of their sides is kept.
+    pub(crate) fn shown(&mut self, mut irradiance: Rows) -> Rows {
+        self.met = Rows::zero(self.pairs.len(), irradiance.width());
+        for (k, [place, _]) in self.pairs.iter().enumerate() {
+            (self.met.row_mut(k)).copy_from_slice(irradiance.row(*place as usize));
+        }
+        for (k, [place, behind]) in self.pairs.iter().enumerate() {
             let shares = [self.own.row(k), self.across.row(k)];
-            mixed(shares, irradiance.row_mut(place), met.row(behind));
+            mixed(
+                shares,
+                irradiance.row_mut(*place as usize),
+                self.met_by(*behind),
+            );
         }
         irradiance
     }
 
+    /// Irradiance of a side itself, by its position among the leaves.
+    fn met_by(&self, place: u32) -> &[f32] {
+        let k = self.pairs.binary_search_by_key(&place, |pair| pair[0]);
+        self.met.row(k.expect("both sides of a sheet are paired"))
+    }
+
+    /// Of each side its position among the leaves, `bright` of its own irradiance, and the share of its light as shown that comes from behind.
+    pub(crate) fn sides(&self, bright: impl Fn(&[f32]) -> f32) -> Vec<(u32, [f32; 2])> {
+        let part = |share: &[f32], met: &[f32]| {
+            let lanes: Vec<f32> = share.iter().zip(met).map(|(s, e)| s * e).collect();
+            bright(&lanes)
+        };
+        let side = |(k, &[place, behind]): (usize, &[u32; 2])| {
+            let met = self.met.row(k);
+            let own = part(self.own.row(k), met);
+            let across = part(self.across.row(k), self.met_by(behind));
+            let share = across / (own + across).max(f32::MIN_POSITIVE);
+            (place, [bright(met), share])
+        };
+        self.pairs.iter().enumerate().map(side).collect()
+    }
+
     /// Bytes held.
     pub(crate) fn bytes(&self) -> usize {
-        8 * self.pairs.len() + self.own.bytes() + self.across.bytes()
+        let rows = [&self.own, &self.across, &self.met];
+        8 * self.pairs.len() + rows.map(Rows::bytes).iter().sum::<usize>()
     }
 }
 
@@ -89,7 +126,7 @@ mod tests {
             [0.25, 0.4, 0.0, 0.0],
         );
         let whole = [0.75, 0.4, 0.2, 0.0];
-        let through = Through::new(
+        let mut through = Through::new(
             vec![[0, 1], [1, 0]],
             [&rows(rho), &rows([tau; 2]), &rows([whole; 2])],
         );

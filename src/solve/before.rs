@@ -19,7 +19,7 @@ pub(super) struct Before {
     graph: Graph,
     balance: RowBalance,
     direct: Direct,
-    /// Of its light only irradiance, the white, the leaves and mirrors are kept.
+    /// Of its light only irradiance, the white, the leaves, mirrors and sheets are kept.
     solution: Solution,
     /// Reflected radiosity of the leaves.
     reflected: Rows,
@@ -50,6 +50,7 @@ impl Bake {
                     irradiance: light.irradiance.clone(),
                     leaves: light.leaves.clone(),
                     mirrors: light.mirrors.clone(),
+                    through: light.through.clone(),
                     white: light.white,
                     ..Light::default()
                 },

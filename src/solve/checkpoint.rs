@@ -165,6 +165,11 @@ impl Bake {
                 leaves.len() * irradiance.width(),
                 (0..leaves.len()).flat_map(|k| irradiance.row(k).iter().copied()),
             )?;
+            let met = &self.solution.light.through.met;
+            out.put_list(
+                met.len() * met.width(),
+                (0..met.len()).flat_map(|k| met.row(k).iter().copied()),
+            )?;
             out.put_list(
                 leaves.len() * self.solution.lanes.len(),
                 leaves
@@ -262,9 +267,12 @@ impl Bake {
         if gone {
             reflected = Rows::default();
         }
-        let mut irradiance = Rows::default();
+        let (mut irradiance, mut through) = (Rows::default(), Through::default());
         if whole {
             irradiance = rows(from, count, width)?;
+            let tree = &self.refinement.tree;
+            let of_sheets = leaves.iter().filter(|&&leaf| tree.behind(leaf) != NONE);
+            through.met = rows(from, of_sheets.count(), width)?;
             let lanes = self.solution.lanes.len();
             let known: Vec<f32> = from.get_exactly(count * lanes)?;
             let figures: Vec<[f32; 2]> = from.get_exactly(count)?;
@@ -284,6 +292,7 @@ impl Bake {
             irradiance,
             leaves,
             white,
+            through,
             ..Light::default()
         };
         Ok((reflected, traces))
@@ -327,7 +336,9 @@ impl Bake {
         let Sources {
             emission, sheets, ..
         } = painter.paint(&self.refinement.tree, &light.leaves, &self.solution.lanes);
+        let met = std::mem::take(&mut light.through.met);
         light.through = sheets.map_or_else(Through::default, |sheets| sheets.shown);
+        light.through.met = met;
         let on_nodes = self.refinement.on_nodes::<L>(reflected, &light.leaves);
         light.reflected =
             self.without_mirrors::<L>(Cow::Borrowed(reflected), on_nodes, &light.leaves);

@@ -156,7 +156,7 @@ impl Bake {
         let sent = with::<L>(&reflected, given.as_ref());
         let on_nodes = self.refinement.on_nodes::<L>(&sent, leaves);
         let through = reflection.sheets.as_ref();
-        let through = through.map(|s| s.shown.clone()).unwrap_or_default();
+        let mut through = through.map(|s| s.shown.clone()).unwrap_or_default();
         let mut flux = flux::FluxBalance::default();
         if counted {
             let fluxes = flux::FluxRows {
@@ -497,11 +497,16 @@ impl Bake {
         let light = &self.solution.light;
         let weights = self.solution.bright_weights();
         let bright = |row: &[f32]| weighed(row, &weights) as f32;
-        let mut arrival = vec![0.0; self.refinement.tree.nodes.len()];
+        let nodes = self.refinement.tree.nodes.len();
+        let mut arrival = vec![0.0; nodes];
         for (k, &leaf) in light.leaves.iter().enumerate() {
             arrival[leaf as usize] = bright(light.irradiance.row(k));
         }
-        self.solution.light.arrival = arrival;
+        let mut sides = vec![[0.0; 2]; if light.through.is_empty() { 0 } else { nodes }];
+        for (place, side) in light.through.sides(bright) {
+            sides[light.leaves[place as usize] as usize] = side;
+        }
+        (self.solution.light.arrival, self.solution.light.sides) = (arrival, sides);
         self.solution.light.bright_lamps = self.solution.bright_lamps();
     }
 

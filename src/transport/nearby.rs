@@ -7,7 +7,8 @@
 //! `B(p) = B (D(p) + B(q)) / H`
 //!
 //! with H the leaf's irradiance, B its reflected radiosity, D(p) the direct light of one lamp chosen at random or met by the next ray, and q the
-//! point where that ray ends, which may be close by again (a path, as in Kajiya 1986). Only brightness follows the path: colours stay those of the leaf.
+//! point where that ray ends, which may be close by again (a path, as in Kajiya 1986). Of a diffuse sheet's light a share comes from behind: so
+//! many paths go on from its other side. Only brightness follows the path: colours stay those of the leaf.
 //! Their number follows from how much light leaves have there. To stop as soon as paths agree made such places dark: what is rare and bright
 //! comes late.
 
@@ -15,6 +16,7 @@ use super::gatherer::{Gatherer, Memory};
 use super::receiver::Receiver;
 use crate::geometry::Hit;
 use crate::geometry::sampling::{cosine_direction, hash, sequence02};
+use crate::hierarchy::NONE;
 use crate::link::Visibility;
 
 /// A point of whose rays more than this share meet black backs lies inside something: then everything is close by.
@@ -29,8 +31,8 @@ const TURNS: f64 = 16.0;
 struct LightPath {
     /// Index of the path's sample.
     sample: u32,
-    /// The leaf and the point that the path has reached, while it goes on.
-    end: Option<(u32, Receiver)>,
+    /// The point that the path has reached, while it goes on.
+    end: Option<Receiver>,
     /// Share of the light there that gets back to the start.
     through: f64,
     /// Light that got back to the start.
@@ -82,13 +84,15 @@ impl Gatherer<'_> {
             .map(|k| {
                 let at = (k as f64 + first) / count as f64;
                 let (leaf, hit) = hits[(at * hits.len() as f64) as usize];
-                LightPath {
+                let mut path = LightPath {
                     sample: turn * FOLLOWED as u32 + k as u32,
-                    end: Some((leaf, self.receiver(leaf, &hit))),
+                    end: None,
                     through: 1.0,
                     sum: 0.0,
                     leaf: f64::from(self.light.bright_reflected[leaf as usize]),
-                }
+                };
+                self.set_out(&mut path, leaf, &hit, hash(!seed, 0));
+                path
             })
             .collect();
         // All paths advance one step at a time: rays from neighbouring places go together.
@@ -96,7 +100,8 @@ impl Gatherer<'_> {
             let samples = |dimension: u64| hash(seed, 2 * step + dimension);
             self.light_ends(&mut paths, samples(1), memory);
             let last = |leaf, hit: &Hit| step + 1 == STEPS || !self.is_near(leaf, hit, backs);
-            self.go_on(&mut paths, last, samples(0), memory);
+            let sides = hash(!seed, step + 1);
+            self.go_on(&mut paths, last, [samples(0), sides], memory);
         }
         pairs.extend(paths.iter().map(|path| [path.sum, path.leaf]));
     }
@@ -107,15 +112,9 @@ impl Gatherer<'_> {
         memory.segments.clear();
         to_lamps.clear();
         for (k, path) in paths.iter_mut().enumerate() {
-            let Some((leaf, to)) = path.end else {
+            let Some(to) = path.end else {
                 continue;
             };
-            let arrival = self.light.arrival[leaf as usize];
-            if arrival <= 0.0 {
-                path.end = None;
-                continue;
-            }
-            path.through *= f64::from(self.light.bright_reflected[leaf as usize] / arrival);
             let sample = sequence02(path.sample, samples);
             let lamps = self.one_lamp(&to, sample);
             for (bright, segment) in lamps.into_iter().flatten() {
@@ -142,11 +141,11 @@ impl Gatherer<'_> {
         &self,
         paths: &mut [LightPath],
         last: impl Fn(u32, &Hit) -> bool,
-        samples: u64,
+        [samples, sides]: [u64; 2],
         memory: &mut Memory,
     ) {
         for path in paths {
-            let Some((_, to)) = path.end.take() else {
+            let Some(to) = path.end.take() else {
                 continue;
             };
             let way = cosine_direction(to.normal, sequence02(path.sample, samples));
@@ -176,8 +175,35 @@ impl Gatherer<'_> {
             if last(leaf, &hit) {
                 path.sum += path.through * f64::from(self.light.bright_reflected[leaf as usize]);
             } else {
-                path.end = Some((leaf, self.receiver(leaf, &hit)));
+                self.set_out(path, leaf, &hit, sides);
             }
+        }
+    }
+
+    /// A path goes on from a point that a ray met: of a sheet, from the side that its light comes from. It ends where no light arrives.
+    fn set_out(&self, path: &mut LightPath, leaf: u32, hit: &Hit, sides: u64) {
+        let mut to = self.receiver(leaf, hit);
+        let mut arrival = self.light.arrival[leaf as usize];
+        if let Some([own, across]) = self.light.sides.get(leaf as usize)
+            && self.tree.behind(leaf) != NONE
+        {
+            arrival = *own;
+            if sequence02(path.sample, sides)[0] < f64::from(*across) {
+                let behind = self.tree.behind(leaf);
+                let element = self.tree.element(self.tree.node(behind));
+                let plane = element.map_or(to.plane, |e| self.tree.face_plane[e.face as usize]);
+                to = Receiver {
+                    normal: -to.normal,
+                    plane,
+                    leaf: Some(behind),
+                    ..to
+                };
+                arrival = self.light.sides[behind as usize][0];
+            }
+        }
+        if arrival > 0.0 {
+            path.through *= f64::from(self.light.bright_reflected[leaf as usize] / arrival);
+            path.end = Some(to);
         }
     }
 
