@@ -3,7 +3,7 @@
 use crate::common;
 use crate::common::built;
 
-use built::{Room, baked, baked_to, close, glanced, sphere};
+use built::{Room, baked, baked_to, close, faces, run, sphere};
 use glam::{DVec3, dvec3};
 use haarlight::audit::{PathReference, Report};
 use haarlight::keep::Relighter;
@@ -71,42 +71,74 @@ fn two_slabs_exchange_light_through_a_sheet() {
     }
 }
 
-/// A sheet of two leaves stands on a floor that the sun lights behind it, and points stand close before it: in the first round too they find the
-/// light of the places that they see. By the leaves alone all have nearly the same.
+/// Two black boxes with a sheet between, which shows on one side what a lit disk on the floor of the other sends it; points are close before it. In
+/// the first round too, when the sheet is two leaves, they find the light of the places that they see.
 #[test]
 fn points_close_to_a_sheet_see_what_passes_there() {
-    let (through, rho, sun, side) = (0.6, 0.9, 1000.0, 3.0);
+    let (through, rho, intensity, side) = (0.6, 0.9, 1000.0, 3.0);
+    let (lamp, outer) = (dvec3(1.5, 1.5, -1.2), 0.6_f64);
     let mut room = Room::new();
-    let sheet = room.sheet(even(0.0), even(0.0), even(through));
-    let (width, height) = (DVec3::X * side, DVec3::Y * side);
-    room.quad(DVec3::ZERO, width, height, sheet);
+    let black = room.paint(0.0);
     let floor = room.paint(rho);
-    room.quad(DVec3::NEG_Z * side, DVec3::Z * side, width, floor);
+    let sheet = room.sheet(even(0.0), even(0.0), even(through));
+    let behind = [black, black, floor, black, black, sheet];
+    room.hollow(dvec3(0.0, 0.0, -side), dvec3(side, side, 0.0), behind);
+    let before = faces(DVec3::ZERO, dvec3(side, side, 1.0));
+    for (k, corners) in before.iter().enumerate() {
+        // Where the sheet is.
+        if k != 4 {
+            room.polygon(corners, black);
+        }
+    }
     crowd(&mut room);
-    room.punctual(LightKind::Directional, DVec3::ZERO, DVec3::NEG_Y, sun);
-    let bake = glanced(room.scene());
-    // Factor from a place at a height above the edge of a rectangle as deep as `side`, standing upright, to the part on one side of it
-    // (Howell, A Catalog of Radiation Heat Transfer Configuration Factors, B-5).
-    let half = |height: f64, width: f64| {
-        let far = height.hypot(side);
-        ((width / height).atan() - height / far * (width / far).atan()) / (2.0 * PI)
+    let inner = outer - 1e-3;
+    let spot = LightKind::Spot { inner, outer };
+    room.punctual(spot, lamp, DVec3::NEG_Y, intensity);
+    // So little may be missed that many paths are followed.
+    let settings = Settings {
+        error: 0.1,
+        rounds: 1,
+        ..Settings::default()
     };
-    // Irradiance by the front of the sheet, by small squares.
-    let of_sheet = |point: DVec3| {
-        let n = 300;
-        let places = (0..n * n).map(|k| {
-            let at = |k: usize| side * (k as f64 + 0.5) / n as f64;
-            let x = dvec3(at(k % n), at(k / n), 0.0);
-            let lit = rho * sun * (half(x.y, x.x) + half(x.y, side - x.x));
-            let way = point - x;
-            through * lit / PI * (way.z / way.length_squared()).powi(2)
-        });
-        places.sum::<f64>() * (side / n as f64).powi(2)
+    let bake = run(room.scene(), settings);
+    let middles = |n: usize| {
+        let at = move |k: usize| (k as f64 + 0.5) / n as f64;
+        (0..n * n).map(move |k| [at(k % n), at(k / n)])
+    };
+    // What small squares of the floor send, and what these bring to small squares of the sheet.
+    let reach = lamp.y * outer.tan();
+    let lit: Vec<(DVec3, f64)> = middles(80)
+        .map(|[u, v]| 2.0 * reach * dvec3(u - 0.5, 0.0, v - 0.5))
+        .filter(|x| x.length() < reach)
+        .map(|x| {
+            let e = intensity * lamp.y / x.length().hypot(lamp.y).powi(3);
+            let area = (2.0 * reach / 80.0).powi(2);
+            (dvec3(lamp.x, 0.0, lamp.z) + x, rho * e / PI * area)
+        })
+        .collect();
+    let shown: Vec<(DVec3, f64)> = middles(100)
+        .map(|[u, v]| {
+            let x = side * dvec3(u, v, 0.0);
+            let by = |&(from, sent): &(DVec3, f64)| {
+                let way = x - from;
+                sent * way.y * way.z / way.length_squared().powi(2)
+            };
+            let area = (side / 100.0).powi(2);
+            (x, through / PI * area * lit.iter().map(by).sum::<f64>())
+        })
+        .collect();
+    let brought = |point: DVec3| {
+        let by = |&(from, sent): &(DVec3, f64)| {
+            let way = point - from;
+            sent * (way.z / way.length_squared()).powi(2)
+        };
+        shown.iter().map(by).sum::<f64>()
     };
     for height in [0.3, 0.9, 1.5, 2.1, 2.7] {
-        let point = dvec3(1.7, height, 0.06);
-        let seen = lux(&bake, point, DVec3::NEG_Z);
-        close(seen, of_sheet(point), 0.05, "before the sheet");
+        let points = [0.7, 1.1, 1.4, 1.9, 2.2].map(|x| dvec3(x, height, 0.06));
+        let want = points.map(brought).iter().sum::<f64>() / points.len() as f64;
+        let seen = mean_lux(&bake, &points.map(|point| (point, DVec3::NEG_Z)));
+        close(seen, want, 0.1, "before the sheet");
     }
 }
 

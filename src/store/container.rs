@@ -49,7 +49,7 @@ impl FileKind {
     /// Raised whenever the body changes its meaning.
     fn version(self) -> u32 {
         match self {
-            Self::Checkpoint => 7,
+            Self::Checkpoint => 8,
             Self::Cache => 9,
         }
     }
