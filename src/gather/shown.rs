@@ -41,12 +41,7 @@ impl Bake {
     fn behind(&self, to: &Receiver) -> Option<(u32, Receiver)> {
         let leaf = to.leaf?;
         let place = self.place_on_sheet(leaf)?;
-        let other = Receiver {
-            normal: -to.normal,
-            leaf: Some(self.tree().behind(leaf)),
-            ..*to
-        };
-        Some((place, other))
+        Some((place, to.turned(self.tree().behind(leaf))))
     }
 
     /// The position of a leaf among the leaves of the solution, if the leaf belongs to a sheet.

@@ -35,8 +35,8 @@ pub struct Light {
     pub deviation: Vec<f32>,
     /// Brightness of the light that arrives on every node that is a leaf, share of the white's; 0 elsewhere.
     pub arrival: Vec<f32>,
-    /// Of nodes that are leaves of sheets: the brightness of the light that arrives on the side itself, and the share of what it sends that comes
-    /// from behind. Empty in a room without sheets.
+    /// Of nodes that are leaves of sheets: the brightness of the light that arrives on the side itself, and the share of its light as
+    /// shown that comes from behind. Empty in a room without sheets.
     pub sides: Vec<[f32; 2]>,
     /// The hierarchy as rays need it.
     pub descent: Descent,

@@ -161,15 +161,8 @@ impl Bake {
             leaves.iter().flat_map(row).copied(),
         )?;
         if whole {
-            out.put_list(
-                leaves.len() * irradiance.width(),
-                (0..leaves.len()).flat_map(|k| irradiance.row(k).iter().copied()),
-            )?;
-            let met = &self.solution.light.through.met;
-            out.put_list(
-                met.len() * met.width(),
-                (0..met.len()).flat_map(|k| met.row(k).iter().copied()),
-            )?;
+            put_rows(irradiance, out)?;
+            put_rows(&self.solution.light.through.met, out)?;
             out.put_list(
                 leaves.len() * self.solution.lanes.len(),
                 leaves
@@ -465,6 +458,13 @@ fn lane_of([light, first, count]: [u32; 3]) -> Read<lanes::Lane> {
         first,
         count,
     })
+}
+
+fn put_rows(rows: &Rows, out: &mut Encoder) -> io::Result<()> {
+    out.put_list(
+        rows.len() * rows.width(),
+        (0..rows.len()).flat_map(|k| rows.row(k).iter().copied()),
+    )
 }
 
 fn rows(from: &mut Decoder, count: usize, width: usize) -> Read<Rows> {

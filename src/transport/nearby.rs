@@ -184,20 +184,13 @@ impl Gatherer<'_> {
     fn set_out(&self, path: &mut LightPath, leaf: u32, hit: &Hit, sides: u64) {
         let mut to = self.receiver(leaf, hit);
         let mut arrival = self.light.arrival[leaf as usize];
-        if let Some([own, across]) = self.light.sides.get(leaf as usize)
-            && self.tree.behind(leaf) != NONE
+        let behind = self.tree.behind(leaf);
+        if let Some(&[own, across]) = self.light.sides.get(leaf as usize)
+            && behind != NONE
         {
-            arrival = *own;
-            if sequence02(path.sample, sides)[0] < f64::from(*across) {
-                let behind = self.tree.behind(leaf);
-                let element = self.tree.element(self.tree.node(behind));
-                let plane = element.map_or(to.plane, |e| self.tree.face_plane[e.face as usize]);
-                to = Receiver {
-                    normal: -to.normal,
-                    plane,
-                    leaf: Some(behind),
-                    ..to
-                };
+            arrival = own;
+            if sequence02(path.sample, sides)[0] < f64::from(across) {
+                to = to.turned(behind);
                 arrival = self.light.sides[behind as usize][0];
             }
         }

@@ -24,6 +24,17 @@ pub struct Receiver {
     pub seed: u64,
 }
 
+impl Receiver {
+    /// The same point on the other side of a sheet, whose leaf there is `behind`.
+    pub(crate) fn turned(self, behind: u32) -> Self {
+        Self {
+            normal: -self.normal,
+            leaf: Some(behind),
+            ..self
+        }
+    }
+}
+
 /// Light at a point.
 #[derive(Debug, Clone)]
 pub struct Gathered {
