@@ -1,7 +1,8 @@
 //! Files appear whole or not at all: written under a temporary name in the same folder, synced, then renamed.
 //!
 //! A crash or a full disk leaves the old file (or none) in place. It does not lock against a second writer of the same
-//! path; the last one to finish wins.
+//! path; the last one to finish wins. Devices and pipes stay what they are: they are written to as they stand. Links are
+//! followed, and stay.
 
 use crate::error::{Error, Result};
 use std::fs::{self, File};
@@ -40,6 +41,11 @@ pub fn write_atomic(
             "give another name with -o",
         ));
     }
+    // A file renamed to /dev/null would take the place of the device, one renamed to a link that of the link.
+    if fs::metadata(path).is_ok_and(|there| !there.is_file() && !there.is_dir()) {
+        return fill_device(path, fill).map_err(|problem| Error::io(path, problem));
+    }
+    let path = &fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
     let temporary = temporary_name(path)?;
     let written = fill_file(&temporary, fill).and_then(|()| fs::rename(&temporary, path));
     if let Err(problem) = written {
@@ -58,6 +64,16 @@ fn fill_file(
     fill(&mut out)?;
     out.flush()?;
     out.get_ref().sync_all()
+}
+
+fn fill_device(
+    path: &Path,
+    fill: impl FnOnce(&mut dyn Write) -> std::io::Result<()>,
+) -> std::io::Result<()> {
+    let device = fs::OpenOptions::new().write(true).open(path)?;
+    let mut out = BufWriter::with_capacity(BUFFER, device);
+    fill(&mut out)?;
+    out.flush()
 }
 
 /// `.NAME.PID.tmp` beside the target: a rename inside one folder is atomic, across file systems it is not.
@@ -95,6 +111,34 @@ mod tests {
         write_atomic(&path, None, |w| w.write_all(b"new")).unwrap();
         assert_eq!(fs::read(&path).unwrap(), b"new");
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+
+    /// As root, a file renamed to /dev/null would replace it for the whole machine.
+    #[test]
+    #[cfg(unix)]
+    fn pipes_and_links_stay_what_they_are() {
+        use std::os::unix::fs::{FileTypeExt, symlink};
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        let made = std::process::Command::new("mkfifo")
+            .arg(at("pipe"))
+            .status();
+        assert!(made.unwrap().success());
+        let reader = std::thread::spawn({
+            let pipe = at("pipe");
+            move || fs::read(pipe).unwrap()
+        });
+        write_atomic(&at("pipe"), None, |w| w.write_all(b"light")).unwrap();
+        assert_eq!(reader.join().unwrap(), b"light");
+        let pipe = fs::metadata(at("pipe")).unwrap();
+        assert!(pipe.file_type().is_fifo());
+
+        fs::write(at("file"), b"old").unwrap();
+        symlink(at("file"), at("link")).unwrap();
+        write_atomic(&at("link"), None, |w| w.write_all(b"new")).unwrap();
+        assert!(fs::symlink_metadata(at("link")).unwrap().is_symlink());
+        assert_eq!(fs::read(at("file")).unwrap(), b"new");
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 3);
     }
 
     #[test]
