@@ -43,11 +43,17 @@ pub fn write_atomic(
     }
     // A file renamed to /dev/null would take the place of the device, one renamed to a link that of the link.
     if fs::metadata(path).is_ok_and(|there| !there.is_file() && !there.is_dir()) {
-        return fill_device(path, fill).map_err(|problem| Error::io(path, problem));
+        let device = fs::OpenOptions::new().write(true).open(path);
+        let written = device.and_then(|device| filled(device, fill));
+        return written
+            .map(drop)
+            .map_err(|problem| Error::io(path, problem));
     }
     let path = &fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
     let temporary = temporary_name(path)?;
-    let written = fill_file(&temporary, fill).and_then(|()| fs::rename(&temporary, path));
+    let written = File::create_new(&temporary)
+        .and_then(|file| filled(file, fill)?.sync_all())
+        .and_then(|()| fs::rename(&temporary, path));
     if let Err(problem) = written {
         // The first problem is the one to report; the file may not even exist.
         let _ = fs::remove_file(&temporary);
@@ -56,24 +62,14 @@ pub fn write_atomic(
     Ok(())
 }
 
-fn fill_file(
-    path: &Path,
+/// `file` with all that `fill` writes.
+fn filled(
+    file: File,
     fill: impl FnOnce(&mut dyn Write) -> std::io::Result<()>,
-) -> std::io::Result<()> {
-    let mut out = BufWriter::with_capacity(BUFFER, File::create_new(path)?);
+) -> std::io::Result<File> {
+    let mut out = BufWriter::with_capacity(BUFFER, file);
     fill(&mut out)?;
-    out.flush()?;
-    out.get_ref().sync_all()
-}
-
-fn fill_device(
-    path: &Path,
-    fill: impl FnOnce(&mut dyn Write) -> std::io::Result<()>,
-) -> std::io::Result<()> {
-    let device = fs::OpenOptions::new().write(true).open(path)?;
-    let mut out = BufWriter::with_capacity(BUFFER, device);
-    fill(&mut out)?;
-    out.flush()
+    Ok(out.into_inner()?)
 }
 
 /// `.NAME.PID.tmp` beside the target: a rename inside one folder is atomic, across file systems it is not.
