@@ -107,6 +107,11 @@ impl Mean {
         0.5 * (self.range[1] - self.range[0]).max(0.0)
     }
 
+    /// Brightness of the brightest open point.
+    pub(super) fn brightest(&self) -> f64 {
+        self.range[1]
+    }
+
     /// Variance of brightness between open points, without the noise of rays.
     pub(super) fn variance(&self) -> f64 {
         let [n, sum, squares, noise] = self.open;

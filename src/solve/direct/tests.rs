@@ -141,3 +141,36 @@ fn shadows_on_leaves_that_matter_are_found() {
     let (much, little) = (found(5.0), found(1.0));
     assert!(much > 0.9 && little < 0.6, "{much} {little}");
 }
+
+/// A lamp so close to a leaf that no place of those that tell how bright it may be sees much of it: one point before the lamp must not pass for
+/// all of the leaf.
+#[test]
+fn leaves_brighter_than_they_may_be_are_uneven() {
+    let tree = divided(3);
+    let lamp = Fake {
+        light: |to| 30.0 * (3.0 - spotted(to)),
+        open: |_| 1.0,
+    };
+    let stake = Stake {
+        split: 0.2,
+        flux: 0.0,
+        tolerance: 0.1,
+        may_split: true,
+        tiny: false,
+    };
+    let (mut lit, mut dark) = (0, 0);
+    for leaf in tree.leaves() {
+        let mean = by_chance(&tree, leaf, &lamp, &stake, &mut Memory::default());
+        let half_range = match mean.bright[1] > 0.0 {
+            true => 45.0,
+            false => -lamp.unshadowed(&tree, leaf, 0.1),
+        };
+        assert_eq!(mean.half_range, half_range);
+        *if half_range > 0.0 {
+            &mut lit
+        } else {
+            &mut dark
+        } += 1;
+    }
+    assert!(lit > 0 && dark > lit, "{lit} {dark}");
+}
