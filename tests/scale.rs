@@ -41,6 +41,8 @@ const ROOM: DVec3 = dvec3(4.0, 2.6, 3.0);
 const THICK: f64 = 0.2;
 /// Points stand so far above the floor, m: what lies in the plane of something else is raised by less.
 const ABOVE: f64 = 1e-3;
+/// CIEDE2000 of a relative error of a mid grey: .5 are about 1.4 %.
+const DE_OF_RELATIVE: f64 = 35.0;
 /// Where on the plain it stands.
 const AWAY: [f64; 2] = [310.0, 170.0];
 
@@ -151,6 +153,7 @@ impl Plan {
             leaves: bake.rounds().iter().map(|r| r.elements).collect(),
             averages: bake.averages(),
             errors: bake.rounds().iter().map(estimate).collect(),
+            by_rays: last.row_bytes > 0,
         };
         println!(
             "{self:?}: {verdict:?} in {} rounds, {:?} leaves, {} links, estimates {:.3?}, white {:.0}, {:.2} s",
@@ -173,6 +176,8 @@ struct Seen {
     /// Leaves and estimates, round by round.
     leaves: Vec<usize>,
     errors: Vec<f64>,
+    /// Does light go by rays there?
+    by_rays: bool,
 }
 
 impl Seen {
@@ -247,7 +252,6 @@ fn a_plain_around_a_room_changes_nothing() {
         let fine = plan.bake(0.2);
         for (ground, estimates) in grounds.into_iter().zip(&mut estimates) {
             let plain = Plan { ground, ..plan }.bake(0.5);
-            // .5 dE00 are about 1.4 % of a mid grey.
             let [rms, most] = plain.off(&fine);
             assert!(rms < 0.014 && most < 0.06, "{ground:?}: off {rms}, {most}");
             let same = |a: f64, b: f64, factor: f64, what: &str| {
@@ -258,8 +262,14 @@ fn a_plain_around_a_room_changes_nothing() {
             };
             same(plain.white, alone.white, 1.1, "white");
             let [[a, b], [leaves, of_alone]] = plain.alike(alone);
-            same(a, b, 2.0, "estimate");
-            *estimates *= a / b;
+            if plain.by_rays == alone.by_rays {
+                same(a, b, 2.0, "estimate");
+                *estimates *= a / b;
+            } else {
+                // After as many rounds one is finer than the other: its estimate must know its own error.
+                let measured = DE_OF_RELATIVE * rms;
+                assert!(a > 0.7 * measured, "{ground:?}: {a} for {measured}");
+            }
             same(leaves, of_alone, 3.0, "leaves");
             // The chance of 160 watched points.
             assert!(plain.errors.len().abs_diff(alone.errors.len()) <= 1);

@@ -43,6 +43,7 @@
 //! | `error.total_de2000`, `.total_de_luv` | dE00, dE*uv | all sources; `null` in the first round, as two are compared |
 //! | `error.total_relative` | 1 | root mean square relative error of illuminance |
 //! | `error.total_xyz` | lm/m2 | root mean square error of tristimulus irradiance |
+//! | `error.noise_de2000` | dE00 | of the error, the noise of a gather, which finer elements do not lessen: an estimate, from two gathers of each watched point; `null` where light goes along links, which have next to none |
 //! | `error.geometry_chromaticity` | 1 | root mean square error of chromaticity by hierarchy, links and visibility, distance in the CIE 1960 (u, v) diagram |
 //! | `error.geometry_de_luv`, `.spectrum_de_luv`, `.convergence_de_luv` | dE*uv | by source |
 //! | `error.convergence` | 1 | of the solve, relative, in the solver's norm |

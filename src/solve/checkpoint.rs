@@ -71,7 +71,7 @@ impl Bake {
             self.solution.light.neighbours =
                 Neighbours::new(self.refinement.tree.nodes.len(), &self.refinement.graph);
             let seen: Vec<[f64; 3]> = from.get_all()?;
-            if !seen.is_empty() && seen.len() != self.room.probes.points.len() {
+            if !seen.is_empty() && seen.len() != self.watched_gathers() {
                 return Err(Broken::new("has another number of watched points"));
             }
             self.solution.seen = seen;

@@ -157,17 +157,26 @@ impl LeafRays {
             // A hierarchy only grows: with as many nodes it is the same one.
             return Ok(0);
         }
-        let cast = self.cast(tree, sight, hemisphere, (seed, interrupt), |_| true)?;
+        let cast = self.cast(
+            tree,
+            sight,
+            hemisphere,
+            LOOKING.0,
+            (seed, interrupt),
+            |_| true,
+        )?;
         self.find(tree, 0);
         Ok(cast)
     }
 
-    /// Lets the new leaves that `is_wanted` names look for themselves, each rank its own. Returns the rays cast by all ranks.
+    /// Lets the new leaves that `is_wanted` names look for themselves, each rank its own, one of mean area by this `share` of the rays of a
+    /// hemisphere. Returns the rays cast by all ranks.
     pub(super) fn cast(
         &mut self,
         tree: &Tree,
         sight: &Sight,
         hemisphere: &Hemisphere,
+        share: f64,
         (seed, interrupt): (u64, &Interrupt),
         is_wanted: impl Fn(u32) -> bool,
     ) -> Result<u64, Interrupted> {
@@ -184,7 +193,7 @@ impl LeafRays {
             .take_while(|&n| n <= hemisphere.len())
             .map(Hemisphere::new)
             .collect();
-        let usual = LOOKING.0 * hemisphere.len() as f64 / mean;
+        let usual = share * hemisphere.len() as f64 / mean;
         let team = self.team;
         let own = new.iter().copied().filter(|&k| team.owns(k as usize));
         let own: Vec<u32> = own.collect();

@@ -1,6 +1,6 @@
 //! What a solution can be asked: light at receivers, and which receivers are covered.
 
-use super::estimate::{self, Distance};
+use super::estimate::{self, EstimatedError};
 use super::solution::NOISY_VERTEX;
 use super::{Bake, Closed, GatherQuality, flux};
 use crate::geometry::{NO_PLANE, Segment};
@@ -17,10 +17,13 @@ const MOSTLY_COVERED: f64 = 0.01;
 const PRESSED: f64 = 2e-3;
 
 impl Bake {
-    /// Gathers at the watched points: how far their light is from that of a round ago, see [`super::estimate`].
-    pub(super) fn distance(&mut self) -> Option<Distance> {
+    /// Gathers at the watched points: how wrong their light is, by that of a round ago, see [`super::estimate`].
+    pub(super) fn estimate(&mut self) -> Option<EstimatedError> {
         let round = self.rounds.len();
-        let mut gathered = self.gather(&self.room.probes.receivers(&self.refinement.tree, round));
+        let by_rays = self.room.by_rays();
+        let gathers = estimate::gathers(by_rays);
+        let tree = &self.refinement.tree;
+        let mut gathered = self.gather(&self.room.probes.receivers(tree, round, gathers));
         if self.room.keep {
             let traces = gathered.iter_mut().map(|g| g.packed.take()).collect();
             self.solution.watched = [std::mem::take(&mut self.solution.watched[1]), traces];
@@ -29,7 +32,6 @@ impl Bake {
             .iter()
             .map(|g| self.solution.lanes.tristimulus(&g.irradiance))
             .collect();
-        let by_rays = self.room.by_rays();
         let fineness = |links: usize, leaves: usize| match by_rays {
             true => leaves.max(1) as f64,
             false => links.max(1) as f64,
@@ -39,12 +41,18 @@ impl Bake {
         let kept = (self.rounds.last()).map_or(1.0, |r| fineness(r.links, r.elements) / now);
         let share = estimate::share(round, by_rays, kept);
         let before = std::mem::replace(&mut self.solution.seen, seen);
-        estimate::compare(
+        estimate::error_between(
             &before,
             &self.solution.seen,
+            gathers,
             self.solution.light.white,
             share,
         )
+    }
+
+    /// Gathers at watched points in a round.
+    pub(super) fn watched_gathers(&self) -> usize {
+        estimate::gathers(self.room.by_rays()) * self.room.probes.points.len()
     }
 
     /// Gathers at receivers, in order.

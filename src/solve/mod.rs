@@ -76,7 +76,8 @@ use threshold_factors::ThresholdFactors;
 
 /// Threshold of the first round, share of white (see [`Demand::threshold`]); each round divides it.
 const FIRST_THRESHOLD: f64 = 0.02;
-/// What a round divides the threshold by: about twice the links, half the error.
+/// What a round divides the threshold by: about twice the links, half the error. By rays the second round does so twice: one step
+/// divides .1 to 1.9 % of the leaves there (`docs/decisions.md`).
 const THRESHOLD_STEP: f64 = 3.0;
 /// Rooms of at least this many faces choose their lanes only once.
 const MANY_FACES: usize = 50_000;
@@ -227,10 +228,11 @@ impl Bake {
             // The light of a first round that was interrupted is nothing to go on from.
             self.begin_again(&self.refinement.tree.grown());
         }
-        let threshold = FIRST_THRESHOLD / THRESHOLD_STEP.powi(round as i32);
+        let by_rays = self.room.by_rays();
+        let steps = round + usize::from(by_rays && round > 0);
+        let threshold = FIRST_THRESHOLD / THRESHOLD_STEP.powi(steps as i32);
 
         let (bright, sensitivity) = self.stakes();
-        let by_rays = self.room.by_rays();
         let faces = self.refinement.tree.faces.len();
         let shares = ThresholdFactors::of(by_rays, is_small(&self.room.mesh), faces);
         let demand = Demand {
@@ -281,13 +283,13 @@ impl Bake {
         self.solution.previous = Rows::default();
         clock.lap("solve");
 
-        let distance = self.distance();
+        let estimate = self.estimate();
         clock.lap("estimate");
         Ok(self.recorded(record::RoundMeasurements {
             threshold,
             refined: &refined,
             convergence: &convergence,
-            distance,
+            estimate,
             flux,
             link_bytes: rows.bytes(),
             rays: refined.rays + escape_rays + self.refinement.direct.rays - direct_rays,

@@ -1,6 +1,6 @@
 //! What is written down after every round: the lines of the log.
 
-use super::estimate::Distance;
+use super::estimate::EstimatedError;
 use super::flux::FluxBalance;
 use super::solver::Convergence;
 use crate::link::Refined;
@@ -95,6 +95,9 @@ pub enum FigureKind {
 pub struct Errors {
     /// All sources, CIEDE2000.
     pub total_de2000: Figure,
+    /// Of these the noise of a gather, which finer patches do not lessen: CIEDE2000; none where light goes along links.
+    #[serde(default = "unknown")]
+    pub noise_de2000: Figure,
     /// All sources, CIELUV.
     pub total_de_luv: Figure,
     /// Root mean square relative error of illuminance.
@@ -219,7 +222,7 @@ pub(crate) struct RoundMeasurements<'a> {
     pub(super) threshold: f64,
     pub(super) refined: &'a Refined,
     pub(super) convergence: &'a Convergence,
-    pub(super) distance: Option<Distance>,
+    pub(super) estimate: Option<EstimatedError>,
     pub(super) flux: FluxBalance,
     pub(super) link_bytes: usize,
     pub(super) rays: u64,

@@ -31,7 +31,7 @@ impl Bake {
             next_round_s: next_round(&past),
             remaining_rounds: ahead.map(|a| a.rounds),
             remaining_s: ahead.map(|a| a.seconds),
-            look_s: m.clock.last() / bake.room.probes.points.len().max(1) as f64,
+            look_s: m.clock.last() / bake.watched_gathers().max(1) as f64,
             phases_s: m
                 .clock
                 .laps()
@@ -102,9 +102,10 @@ impl Bake {
             (geometry * geometry + spectrum * spectrum + convergence_de * convergence_de).sqrt()
         };
         let white = self.solution.light.white.iter().sum::<f64>();
-        let of = |figure: &dyn Fn(Distance) -> f64| estimate(m.distance.map(figure));
+        let of = |figure: &dyn Fn(Distance) -> f64| estimate(m.estimate.map(|e| figure(e.error)));
         Errors {
-            total_de2000: estimate(m.distance.map(|d| all(d.de2000)).filter(|e| e.is_finite())),
+            total_de2000: of(&|d| all(d.de2000)),
+            noise_de2000: estimate(m.estimate.and_then(|e| e.noise)),
             total_de_luv: of(&|d| all(d.de_luv)),
             total_relative: of(&|d| d.relative.hypot(m.convergence.bound)),
             geometry_chromaticity: of(&|d| d.chromaticity),

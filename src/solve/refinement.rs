@@ -19,6 +19,9 @@ const LEVELS: usize = 4;
 const MOST_VARIATION: f64 = std::f64::consts::FRAC_1_SQRT_2;
 /// Distinguishes the rays that decide on splits from those that bring light.
 const DECIDING: u64 = 0xdec1de;
+/// How many these are for a leaf of mean area, share of a point's: a quarter of those that bring light. With as many as those a living room takes 1.34
+/// times as long and a garage 1.04 times, as many leaves within 2 %, and points are off by 2.20 for 2.33 % and 1.68 for 1.76 (root mean square beside Mitsuba, one seed).
+const DECIDING_SHARE: f64 = 1.0 / 16.0;
 
 /// A room divided as finely as the rounds so far asked for.
 #[derive(Default)]
@@ -119,7 +122,14 @@ impl Refinement {
             let may_split = |k: u32| splits(k, MOST_VARIATION * brightest);
             rays += room.with_sight(|sight| {
                 let how = (seed, &room.interrupt);
-                deciding.cast(tree, sight, &room.hemisphere, how, may_split)
+                deciding.cast(
+                    tree,
+                    sight,
+                    &room.hemisphere,
+                    DECIDING_SHARE,
+                    how,
+                    may_split,
+                )
             })?;
             // Ends on leaves that were split just now are as bright as these were: they need not be looked up again.
             deciding.find(tree, found);

@@ -49,8 +49,8 @@ impl FileKind {
     /// Raised whenever the body changes its meaning.
     fn version(self) -> u32 {
         match self {
-            Self::Checkpoint => 8,
-            Self::Cache => 9,
+            Self::Checkpoint => 9,
+            Self::Cache => 10,
         }
     }
 
