@@ -54,10 +54,6 @@ const DECIDING: usize = 64;
 /// second seed before), by 2.63, 2.28 and 2.50 in a garage, by 2.85, 2.03 and 2.89 in a home theatre and by 2.63 and 1.76 in a canteen (root mean
 /// square beside Mitsuba, seeds 0 and 1, or 0; while near paths took the mean of even leaves), in 1.0 and 1.5 times the garage's and the canteen's time.
 const MISSED: f64 = 3.0;
-/// A leaf on which a point is this many times as bright as any place was taken to be is uneven, whatever is known of it. Beside a sconce that
-/// touches a home theatre's wall, one of a leaf's few points passed for all of it: with one of two seeds 2.8 % of all light in place of .25 %.
-/// Points were off by .263 dE00 there, .28 % too bright in the mean; now by .178 and .15 % too dark.
-const SURPRISING: f64 = 2.0;
 /// Rough share of all direct light that a leaf may misplace by too few points. With this a garage's leaves receive from
 /// the first round on what its lamp sends, within a per cent.
 const FLUX_SHARE: f64 = 2e-4;
@@ -445,34 +441,27 @@ fn by_chance(
     // Errors fall with the power 3/4 of the number of points.
     let enough = (most * stake.flux).powf(4.0 / 3.0).ceil() as usize;
     let count = enough.clamp(RANDOM[0], RANDOM[2]).next_power_of_two();
-    let half_range = if most * stake.split <= 1.0 {
+    if most * stake.split <= 1.0 {
         gather(&mut mean, 0..count);
-        -most
-    } else {
-        // Points beyond those that the mean may use: as many again for as long as they find light to be even.
-        let (wanted, mut decide) = (stake.deciding(most), Mean::new());
-        let mut points = 0..RANDOM[1];
-        while points.start < wanted {
-            gather(
-                &mut decide,
-                RANDOM[2] + points.start..RANDOM[2] + points.end,
-            );
-            // Half the range of a uniform distribution of this variance.
-            decide.half_range = (3.0 * decide.variance()).sqrt();
-            if stake.may_split && decide.half_range * stake.split > 1.0 {
-                return decide;
-            }
-            points = points.end..2 * points.end;
+        return mean.ranging(-most, most);
+    }
+    // Points beyond those that the mean may use: as many again for as long as they find light to be even.
+    let (wanted, mut decide) = (stake.deciding(most), Mean::new());
+    let mut points = 0..RANDOM[1];
+    while points.start < wanted {
+        gather(
+            &mut decide,
+            RANDOM[2] + points.start..RANDOM[2] + points.end,
+        );
+        // Half the range of a uniform distribution of this variance.
+        decide.half_range = (3.0 * decide.variance()).sqrt();
+        if stake.may_split && decide.half_range * stake.split > 1.0 {
+            return decide;
         }
-        gather(&mut mean, 0..count.max(RANDOM[1]));
-        decide.half_range
-    };
-    let brightest = mean.brightest();
-    mean.half_range = match brightest > SURPRISING * most {
-        true => 0.5 * brightest,
-        false => half_range,
-    };
-    mean
+        points = points.end..2 * points.end;
+    }
+    gather(&mut mean, 0..count.max(RANDOM[1]));
+    mean.ranging(decide.half_range, most)
 }
 
 #[cfg(test)]

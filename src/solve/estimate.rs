@@ -17,8 +17,6 @@ use crate::geometry::sampling::Pcg;
 use crate::hierarchy::Tree;
 use crate::transport::Receiver;
 use glam::DVec3;
-use std::f64::consts::FRAC_1_SQRT_2;
-use std::slice::Chunks;
 
 /// Points watched.
 const POINTS: usize = 160;
@@ -59,6 +57,7 @@ pub(crate) struct EstimatedError {
 }
 
 impl Distance {
+    /// From `before` to `now`, at the same points.
     fn between(before: &[[f64; 3]], now: &[[f64; 3]], white: [f64; 3]) -> Self {
         let n = now.len() as f64;
         // Equal light has no difference, also in a room without light, where there is no white.
@@ -163,23 +162,28 @@ pub(super) fn error_between(
     if !sound || before.is_empty() {
         return None;
     }
-    let between = |a: &[[f64; 3]], b: &[[f64; 3]]| {
-        Some(Distance::between(a, b, white)).filter(Distance::is_known)
+    let points = now.len() / gathers;
+    let pairs = |a: &[[f64; 3]], b: &[[f64; 3]]| -> Option<Vec<Distance>> {
+        let of_one = |a| {
+            b.chunks(points)
+                .map(move |b| Distance::between(a, b, white))
+        };
+        let all = a.chunks(points).flat_map(of_one);
+        all.map(|d| Some(d).filter(Distance::is_known)).collect()
     };
-    let [before, now] = [before, now].map(|seen| seen.chunks(seen.len() / gathers));
-    let rounds: Option<Vec<Distance>> = before
-        .clone()
-        .flat_map(|a| now.clone().map(move |b| between(a, b)))
-        .collect();
-    let twins = |seen: Chunks<[f64; 3]>| match seen.collect::<Vec<_>>()[..] {
-        [a, b] => between(a, b),
-        _ => Some(Distance::default()),
+    // A gather and itself are not apart: the mean square of all pairs of two twins is half of theirs, which is their noise's.
+    let [rounds, twins_before, twins] = [
+        pairs(before, now)?,
+        pairs(before, before)?,
+        pairs(now, now)?,
+    ];
+    let square = |pairs: &[Distance], of: fn(&Distance) -> f64| {
+        pairs.iter().map(|d| of(d).powi(2)).sum::<f64>() / pairs.len() as f64
     };
-    let (rounds, twins) = (rounds?, [twins(before)?, twins(now)?]);
     let error = |of: fn(&Distance) -> f64| {
-        let square = |d: &[Distance]| d.iter().map(|d| of(d).powi(2)).sum::<f64>() / d.len() as f64;
-        let moved = (square(&rounds) - square(&twins)).max(0.0);
-        (0.5 * of(&twins[1]).powi(2) + share * share * moved).sqrt()
+        let noise = square(&twins, of);
+        let moved = square(&rounds, of) - square(&twins_before, of) - noise;
+        (noise + share * share * moved.max(0.0)).sqrt()
     };
     let error = Distance {
         de2000: error(|d| d.de2000),
@@ -187,7 +191,7 @@ pub(super) fn error_between(
         relative: error(|d| d.relative),
         chromaticity: error(|d| d.chromaticity),
     };
-    let noise = (gathers > 1).then_some(twins[1].de2000 * FRAC_1_SQRT_2);
+    let noise = (gathers > 1).then(|| square(&twins, |d| d.de2000).sqrt());
     Some(EstimatedError { error, noise })
 }
 

@@ -10,6 +10,11 @@ use crate::transport::trace::Trace;
 /// A point that sees no front has this small weight, so that a leaf which nobody sees is not without light.
 pub(super) const UNSEEN: f32 = 1e-4;
 
+/// A leaf on which a point is this many times as bright as any place was taken to be is uneven, whatever is known of it. Beside a sconce that
+/// touches a home theatre's wall, one of a leaf's few points passed for all of it: with one of two seeds 2.8 % of all light in place of .25 %.
+/// Points were off by .263 dE00 there, .28 % too bright in the mean; now by .178 and .15 % too dark.
+const SURPRISING: f64 = 2.0;
+
 /// Direct light at some leaves, in order.
 #[derive(Debug, Default)]
 pub(super) struct LeafSamples {
@@ -107,9 +112,14 @@ impl Mean {
         0.5 * (self.range[1] - self.range[0]).max(0.0)
     }
 
-    /// Brightness of the brightest open point.
-    pub(super) fn brightest(&self) -> f64 {
-        self.range[1]
+    /// With half a range of brightness as it is `known`, on a leaf of which no place was taken to be brighter than `most`: see [`SURPRISING`].
+    pub(super) fn ranging(mut self, known: f64, most: f64) -> Self {
+        let brightest = self.range[1];
+        self.half_range = match brightest > SURPRISING * most {
+            true => 0.5 * brightest,
+            false => known,
+        };
+        self
     }
 
     /// Variance of brightness between open points, without the noise of rays.
