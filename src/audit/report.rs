@@ -8,7 +8,7 @@ use super::summary::{ErrorSummary, Measured};
 use crate::color::de2000;
 use crate::gather::Baked;
 use crate::lightmap::LightMaps;
-use crate::solve::Bake;
+use crate::solve::{Bake, GatherQuality};
 use glam::DVec3;
 use serde::Serialize;
 
@@ -135,9 +135,9 @@ impl Report {
         Self::against(bake, &PathReference::new(bake, points, most_paths, seed))
     }
 
-    /// Compares a bake with a reference of the same room: light gathered at the points.
+    /// Compares a bake with a reference of the same room: light gathered at the points as at watched ones, of which the estimate speaks.
     pub fn against(bake: &Bake, reference: &PathReference) -> Self {
-        let gathered = bake.gather(&reference.receivers(bake));
+        let gathered = bake.gather_with(&reference.receivers(bake), GatherQuality::Watched);
         let light = gathered.iter();
         let light = light.map(|g| Some(bake.lanes().tristimulus(&g.irradiance)));
         let last = bake.rounds().last();

@@ -1,7 +1,7 @@
 //! What a solution can be asked: light at receivers, and which receivers are covered.
 
 use super::estimate::{self, EstimatedError};
-use super::solution::NOISY_VERTEX;
+use super::solution::{NOISE_AT_VERTEX, NOISE_WHEN_WATCHED};
 use super::{Bake, Closed, GatherQuality, flux};
 use crate::geometry::{NO_PLANE, Segment};
 use crate::hierarchy::NONE;
@@ -23,7 +23,8 @@ impl Bake {
         let by_rays = self.room.by_rays();
         let gathers = estimate::gathers(by_rays);
         let tree = &self.refinement.tree;
-        let mut gathered = self.gather(&self.room.probes.receivers(tree, round, gathers));
+        let watched = self.room.probes.receivers(tree, round, gathers);
+        let mut gathered = self.gather_with(&watched, GatherQuality::Watched);
         if self.room.keep {
             let traces = gathered.iter_mut().map(|g| g.packed.take()).collect();
             self.solution.watched = [std::mem::take(&mut self.solution.watched[1]), traces];
@@ -77,8 +78,13 @@ impl Bake {
             {
                 *hemisphere = &sketched;
             }
-            if quality != GatherQuality::Full {
-                (gatherer.most_backs, gatherer.noisy) = (MOSTLY, NOISY_VERTEX);
+            match quality {
+                GatherQuality::Full => {}
+                GatherQuality::Watched => gatherer.allowed_noise = NOISE_WHEN_WATCHED,
+                GatherQuality::Vertex | GatherQuality::Preview => {
+                    gatherer.most_backs = MOSTLY;
+                    gatherer.allowed_noise = NOISE_AT_VERTEX;
+                }
             }
             let at = |memory: &mut Memory, r: &Receiver| gatherer.at(r, memory).pack();
             self.room.team.map(receivers, Memory::default, at)

@@ -99,6 +99,8 @@ pub(crate) const NOBODY: &str = "nobody interrupts it";
 pub(crate) enum GatherQuality {
     /// Points anywhere.
     Full,
+    /// Watched points, by which the error is estimated.
+    Watched,
     /// Vertices: nobody sees those that lie inside something, and as there are many, they follow fewer paths.
     Vertex,
     /// A picture of an unfinished bake.

@@ -42,6 +42,19 @@ pub(super) struct SourceElement {
     pub(super) carries: f64,
 }
 
+/// How much light may err by chance at a point, in tolerances, and what is spent on that at the most.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct AllowedNoise {
+    /// The light of all lamps together.
+    pub(crate) lamps: f64,
+    /// Rays to all lamps, or all bright patches, together.
+    pub(crate) most_rays: usize,
+    /// What is met close by, see `transport::nearby`.
+    pub(crate) nearby: f64,
+    /// Turns of paths from there.
+    pub(crate) most_turns: f64,
+}
+
 /// Reused memory of one thread and its ray count.
 #[derive(Debug, Default)]
 pub struct Memory {
@@ -120,8 +133,8 @@ pub struct Gatherer<'a> {
     pub(crate) via: Option<Via>,
     /// What one patch may misplace, share of the white's irradiance.
     pub tolerance: f64,
-    /// That, times this, is what light close by may err by chance, see `transport::nearby`.
-    pub(crate) noisy: f64,
+    /// What light may err by chance.
+    pub(crate) allowed_noise: AllowedNoise,
     /// Must the visible factors sum to 1? Then indirect light is divided by their sum.
     pub closed: bool,
     /// The directions of rays for indirect light, where rays find patches sooner than links do; none: by links.

@@ -22,15 +22,12 @@ const NEAR: f64 = 2.0;
 const PARTS: usize = 64;
 /// How often one part is divided for a single ray: 4^3 is [`PARTS`].
 const DIVISIONS: usize = 3;
-/// Rays to all lamps, or all bright patches, together: the least, and the most.
-const RAYS: [usize; 2] = [8, 256];
+/// Rays to all lamps, or all bright patches, together, at the least.
+const LEAST_RAYS: usize = 8;
 /// Rays from each of the many points that represent a leaf. With 4 a furnished room's leaves stay so noisy that a
 /// further round is needed; with 8 that happens in one room of three, and no time is saved.
 const LEAF_RAYS: usize = 16;
-/// All lamps together may misplace as much as this many patches. With 1, 2 and 4 three furnished rooms end at the same
-/// errors (.37, .31, .26 mean CIEDE2000) within .01.
-const PATCHES: f64 = 4.0;
-/// The same of all bright patches together. With 4, 2 and 1 half of 2,500 points of the file are off by more than .455, .425, .419 dE00 in a
+/// What all bright patches together may err by chance, in tolerances. With 4, 2 and 1 half of 2,500 points of the file are off by more than .455, .425, .419 dE00 in a
 /// garage and .401, .397, .386 in a living room (grey, `--error 1`), from 42, 65, 94 and 15, 28, 51 such rays a look; with rays for each patch by itself,
 /// 440 and 73 a look, by .437 and .368, and the garage took 54 CPU seconds for 43 to 46.
 const BRIGHT_PATCHES: f64 = 1.0;
@@ -178,11 +175,11 @@ impl Gatherer<'_> {
         let sources = std::mem::take(&mut memory.sources);
         let all: f64 = sources.iter().map(|source| source.carries).sum();
         if all > 0.0 {
-            let patches = match which {
-                RadiosityPart::Emitted => PATCHES,
+            let noise = match which {
+                RadiosityPart::Emitted => self.allowed_noise.lamps,
                 _ => BRIGHT_PATCHES,
             };
-            let count = self.rays_to_sources(to, all, patches);
+            let count = self.rays_to_sources(to, all, noise);
             let owners = self.aim(to, &sources, (all, count), memory);
             self.blocked(&memory.segments, &mut memory.blocked);
             memory.rays += memory.segments.len() as u64;
@@ -287,16 +284,16 @@ impl Gatherer<'_> {
 
     /// How many rays are worth while to lamps that would bring `all`, share of white.
     pub(super) fn rays_to_lamps(&self, to: &Receiver, all: f64) -> usize {
-        self.rays_to_sources(to, all, PATCHES)
+        self.rays_to_sources(to, all, self.allowed_noise.lamps)
     }
 
-    /// How many rays are worth while to lamps or patches that would bring `all`, share of white, and may misplace as much as a number
-    /// of patches.
-    fn rays_to_sources(&self, to: &Receiver, all: f64, patches: f64) -> usize {
+    /// How many rays are worth while to lamps or patches that would bring `all`, share of white, and may err by so many tolerances.
+    fn rays_to_sources(&self, to: &Receiver, all: f64, noise: f64) -> usize {
         // Stratified rays err by about 0.5 n^(-3/4) where a boundary crosses. Where many points represent a leaf, their number compensates.
-        let wanted = 0.5 * all / (patches * self.tolerance_at(to, all));
+        let wanted = 0.5 * all / (noise * self.tolerance_at(to, all));
         match self.shafts {
-            true => (wanted.powf(4.0 / 3.0).ceil() as usize).clamp(RAYS[0], RAYS[1]),
+            true => (wanted.powf(4.0 / 3.0).ceil() as usize)
+                .clamp(LEAST_RAYS, self.allowed_noise.most_rays),
             false => LEAF_RAYS,
         }
     }
@@ -376,6 +373,9 @@ impl Gatherer<'_> {
 mod tests {
     use super::*;
     use crate::geometry::sampling::Pcg;
+    use crate::light::brightness;
+    use crate::transport::AllowedNoise;
+    use crate::transport::tests::{baked, middle};
 
     fn to() -> Receiver {
         Receiver {
@@ -445,5 +445,45 @@ mod tests {
                 assert!((mean - 1.0).abs() < 5e-3, "{height}, one part: {mean}");
             }
         }
+    }
+
+    /// The less lamps may err by chance, the less their light differs from seed to seed.
+    #[test]
+    fn lamps_err_by_less_where_they_may() {
+        const SEEDS: u64 = 16;
+        let bake = baked("furnished.glb", 2);
+        bake.room.with_sight(|sight| {
+            let mut memory = Memory::default();
+            let mut rms = |lamps: f64| {
+                let usual = bake.gatherer(sight);
+                let gatherer = Gatherer {
+                    allowed_noise: AllowedNoise {
+                        lamps,
+                        ..usual.allowed_noise
+                    },
+                    ..usual
+                };
+                let mut light = |to: &Receiver, seed: u64| {
+                    memory.begin(bake.tree().nodes.len());
+                    let direct = gatherer.direct(&Receiver { seed, ..*to }, &mut memory);
+                    let width = bake.light().width();
+                    let xyz = bake.lanes().tristimulus(&direct[..width]);
+                    brightness(xyz, bake.light().white)
+                };
+                let (mut sum, mut places) = (0.0, 0.0);
+                for leaf in bake.tree().leaves().step_by(17) {
+                    let to = middle(bake.tree(), leaf);
+                    let lights: Vec<f64> = (0..SEEDS).map(|seed| light(&to, seed)).collect();
+                    let mean = lights.iter().sum::<f64>() / SEEDS as f64;
+                    let square = lights.iter().map(|x| (x - mean).powi(2)).sum::<f64>();
+                    let tolerance = gatherer.tolerance_at(&to, mean);
+                    sum += square / (SEEDS - 1) as f64 / tolerance.powi(2);
+                    places += 1.0;
+                }
+                (sum / places).sqrt()
+            };
+            let [few, many] = [4.0, 1.0].map(&mut rms);
+            assert!(few > 0.1 && many < 0.6 * few, "{few} {many}");
+        });
     }
 }

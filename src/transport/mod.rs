@@ -39,6 +39,7 @@ pub(crate) mod tests;
 pub(crate) mod trace;
 mod via;
 
+pub(crate) use gatherer::AllowedNoise;
 pub use gatherer::{Gatherer, Memory};
 pub use punctual::punctual_factor;
 pub use receiver::{Gathered, MOSTLY, Receiver};

@@ -23,9 +23,8 @@ use crate::link::Visibility;
 const WITHIN: f64 = 1.0 / 16.0;
 /// Steps of a path at the most.
 const STEPS: u64 = 8;
-/// Rays that meet something close by and are followed in a turn, and turns at the most.
+/// Rays that meet something close by and are followed in a turn.
 const FOLLOWED: usize = 64;
-const TURNS: f64 = 16.0;
 
 /// The light reflected at a point close by, by one path.
 struct LightPath {
@@ -59,8 +58,10 @@ impl Gatherer<'_> {
     ) -> f64 {
         let bright = |hit: &(u32, Hit)| f64::from(self.light.bright_reflected[hit.0 as usize]);
         let carries = share * hits.iter().map(bright).sum::<f64>();
-        let worth = carries / (self.noisy * self.tolerance_at(to, carries));
-        let turns = (worth * worth / FOLLOWED as f64).ceil().clamp(1.0, TURNS);
+        let worth = carries / (self.allowed_noise.nearby * self.tolerance_at(to, carries));
+        let turns = (worth * worth / FOLLOWED as f64)
+            .ceil()
+            .clamp(1.0, self.allowed_noise.most_turns);
         let mut pairs = Vec::new();
         for turn in 0..turns as u32 {
             self.paths_back(hits, (to.seed, turn), backs, memory, &mut pairs);
