@@ -11,9 +11,9 @@ use crate::transport::{AllowedNoise, Gatherer};
 
 /// What one patch may misplace in a gather, share of the asked-for error.
 const GATHER_SHARE: f64 = 0.1;
-/// At points that are asked for, which are few. With as much noise as at watched ones and with this they are off by 4.7 and 3.7 % in a dungeon at the default, by
+/// At points that are asked for, which are few. With as much noise as at watched ones and with this they are off by 4.7 and 3.6 % in a dungeon at the default, by
 /// 3.5 and 2.9 in a restaurant, 2.6 and 2.5 in a living room, 2.6 and 2.0 in a home theatre and 1.9 and 1.5 in a garage (root mean square beside Mitsuba, seed 0),
-/// in 63 and 65, 45 and 51, 11 and 12, 16 and 13, 10 and 13 CPU seconds. With half of it and 64 turns, by 4.0, 2.9, 2.3, 1.9 and 1.6 % in 63,
+/// in 63 and 109, 47 and 54, 10 and 10, 14 and 12, 11 and 10 CPU seconds. With half of it and 64 turns, watched points as well, by 4.0, 2.9, 2.3, 1.9 and 1.6 % in 63,
 /// 54, 18, 21 and 14.
 const NOISE_AT_POINT: AllowedNoise = AllowedNoise {
     lamps: 1.0,
