@@ -1,7 +1,7 @@
 //! What a solution can be asked: light at receivers, and which receivers are covered.
 
 use super::estimate::{self, EstimatedError};
-use super::solution::{NOISE_AT_VERTEX, NOISE_WHEN_WATCHED};
+use super::solution::{NOISE_AT_POINT, NOISE_AT_VERTEX};
 use super::{Bake, Closed, GatherQuality, flux};
 use crate::geometry::{NO_PLANE, Segment};
 use crate::hierarchy::NONE;
@@ -79,8 +79,8 @@ impl Bake {
                 *hemisphere = &sketched;
             }
             match quality {
-                GatherQuality::Full => {}
-                GatherQuality::Watched => gatherer.allowed_noise = NOISE_WHEN_WATCHED,
+                GatherQuality::Full => gatherer.allowed_noise = NOISE_AT_POINT,
+                GatherQuality::Watched => {}
                 GatherQuality::Vertex | GatherQuality::Preview => {
                     gatherer.most_backs = MOSTLY;
                     gatherer.allowed_noise = NOISE_AT_VERTEX;

@@ -459,12 +459,12 @@ mod tests {
                 let gatherer = Gatherer {
                     allowed_noise: AllowedNoise {
                         lamps,
+                        most_rays: 1024,
                         ..usual.allowed_noise
                     },
                     ..usual
                 };
                 let mut light = |to: &Receiver, seed: u64| {
-                    memory.begin(bake.tree().nodes.len());
                     let direct = gatherer.direct(&Receiver { seed, ..*to }, &mut memory);
                     let width = bake.light().width();
                     let xyz = bake.lanes().tristimulus(&direct[..width]);
