@@ -125,7 +125,7 @@ mod tests {
             move || fs::read(pipe).unwrap()
         });
         write_atomic(&at("pipe"), None, |w| w.write_all(b"light")).unwrap();
-        // Of a pipe that was replaced nobody ever reads the end.
+        // First, as the reader of a pipe that was replaced may wait for ever.
         let pipe = fs::metadata(at("pipe")).unwrap();
         assert!(pipe.file_type().is_fifo());
         assert_eq!(reader.join().unwrap(), b"light");
