@@ -22,4 +22,4 @@ pub use mirrors::{BOUNCES, MirrorImage, Mirrors, Route};
 pub use panes::{Crossing, Glazing, Panes};
 pub use spaces::spaces;
 pub use tree::{Element, NONE, Node, Sample, Tree, TreeSize};
-pub(crate) use tree::{leaf_below, quarter, stratified};
+pub(crate) use tree::{place_below, quarter, stratified};

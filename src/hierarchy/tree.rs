@@ -380,11 +380,20 @@ impl Tree {
 }
 
 /// The leaf that contains a point of a face; `first` gives the first child of a node, [`NONE`] for a leaf.
-pub(crate) fn leaf_below(face: u32, mut weights: [f64; 3], first: impl Fn(u32) -> u32) -> u32 {
+fn leaf_below(face: u32, weights: [f64; 3], first: impl Fn(u32) -> u32) -> u32 {
+    place_below(face, weights, first).0
+}
+
+/// The same, and the weights of the point on that leaf.
+pub(crate) fn place_below(
+    face: u32,
+    mut weights: [f64; 3],
+    first: impl Fn(u32) -> u32,
+) -> (u32, [f64; 3]) {
     let mut id = face;
     loop {
         match first(id) {
-            NONE => return id,
+            NONE => return (id, weights),
             child => id = child + quarter(&mut weights),
         }
     }

@@ -507,6 +507,7 @@ impl Relighter {
             reflected,
             emitted,
             tolerance,
+            tilts: false,
             // A sweep more, which a first answer does without.
             counted: tolerance <= bake.room.tolerance(),
         };

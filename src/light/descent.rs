@@ -3,11 +3,17 @@
 //!
 //! Every ray goes this way, and nodes lie far apart in memory: what rays need of them is kept here, 12 bytes a node.
 
-use crate::hierarchy::{NONE, Tree, leaf_below};
+use super::tilts::{Place, place};
+use crate::hierarchy::{NONE, Tree, place_below};
 use crate::link::POLYGONS;
 
 /// Hits nearer to a leaf than this many times the square root of its area are close by.
 const NEAR: f64 = 1.5;
+
+/// Hits nearer than this to a leaf of an area are close by.
+pub(crate) fn close_by(area: f64) -> f32 {
+    (NEAR * area.sqrt()) as f32
+}
 
 /// What rays need of the nodes that a solution knows.
 #[derive(Debug, Clone, Default)]
@@ -32,17 +38,19 @@ impl Descent {
         let steps = tree.nodes.iter().map(|node| Step {
             child: node.child,
             above: Some(node.parent).filter(whole).unwrap_or(NONE),
-            near: (NEAR * node.area.sqrt()) as f32,
+            near: close_by(node.area),
         });
         Self {
             steps: steps.collect(),
         }
     }
 
-    /// The leaf that contains a point of a face, as found by [`Tree::leaf_at`] when the solution was made.
-    pub(crate) fn leaf_at(&self, tree: &Tree, entry: u32, weights: [f64; 3]) -> u32 {
+    /// The leaf that contains a point of a face, as found by [`Tree::leaf_at`] when the solution was made, and where on the leaf the point
+    /// lies.
+    pub(crate) fn place_at(&self, tree: &Tree, entry: u32, weights: [f64; 3]) -> (u32, Place) {
         let face = tree.face_node[entry as usize];
-        leaf_below(face, weights, |k| self.steps[k as usize].child)
+        let (leaf, weights) = place_below(face, weights, |k| self.steps[k as usize].child);
+        (leaf, place(weights))
     }
 
     /// A patch and its ancestors that may be gathered as a whole.
@@ -95,7 +103,7 @@ mod tests {
         let known: Vec<u32> = places.iter().map(|&(e, w)| tree.leaf_at(e, w)).collect();
         split(&mut tree, 100);
         for (&(entry, w), &leaf) in places.iter().zip(&known) {
-            assert_eq!(descent.leaf_at(&tree, entry, w), leaf);
+            assert_eq!(descent.place_at(&tree, entry, w).0, leaf);
             // All ancestors of few faces, and no other nodes.
             let parent = |&id: &u32| Some(tree.node(id).parent).filter(|&p| p != NONE);
             let plain = std::iter::successors(Some(leaf), parent)

@@ -9,8 +9,10 @@ pub(crate) mod passed;
 pub(crate) mod rows;
 mod solution;
 mod through;
+mod tilts;
 
 pub use descent::Descent;
+pub(crate) use descent::close_by;
 pub use filters::{Filter, Filters, Glass};
 pub(crate) use filters::{Passage, Tint, accumulate};
 pub use fixtures::Fixtures;
@@ -21,3 +23,4 @@ pub use solution::{Light, Neighbours};
 pub(crate) use solution::{brightness, lightness_sensitivity, weighed};
 pub use through::Through;
 pub(crate) use through::mixed;
+pub(crate) use tilts::{Place, Tilts, place};

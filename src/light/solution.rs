@@ -5,6 +5,7 @@ use super::fixtures::Fixtures;
 use super::lanes::Lanes;
 use super::rows::Rows;
 use super::through::Through;
+use super::tilts::Tilts;
 use crate::hierarchy::{Mesh, NONE, Tree};
 use crate::link::{Graph, Occlusion};
 use rayon::prelude::*;
@@ -47,6 +48,8 @@ pub struct Light {
     pub fixtures: Fixtures,
     /// Brightness of a punctual light's intensity (of its normal irradiance where it is directional).
     pub bright_lamps: Vec<f32>,
+    /// Where leaves are brighter, as rays find it; even elsewhere.
+    pub(crate) tilts: Tilts,
     /// The links of each node.
     pub neighbours: Neighbours,
     /// Irradiance of the adaptation white, tristimulus.
@@ -82,6 +85,7 @@ impl Light {
         rows.iter().map(|rows| rows.bytes()).sum::<usize>()
             + scalars.iter().map(|list| 4 * list.len()).sum::<usize>()
             + 8 * self.sides.len()
+            + size_of_val(self.tilts.0.as_slice())
             + self.descent.bytes()
             + self.through.bytes()
             + self.fixtures.bytes()

@@ -51,6 +51,7 @@ impl Bake {
                     leaves: light.leaves.clone(),
                     mirrors: light.mirrors.clone(),
                     through: light.through.clone(),
+                    tilts: light.tilts.clone(),
                     white: light.white,
                     ..Light::default()
                 },
@@ -79,6 +80,7 @@ impl Bake {
         tints.on(&self.solution.filters);
         self.light_up(&before.reflected);
         self.light_arrives();
+        self.refinement.leaf_rays.tilts = self.solution.light.tilts.clone();
         self.solution.light.neighbours =
             Neighbours::new(self.refinement.tree.nodes.len(), &self.refinement.graph);
     }

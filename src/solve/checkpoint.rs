@@ -268,7 +268,7 @@ impl Bake {
             through.met = rows(from, of_sheets.count(), width)?;
             let lanes = self.solution.lanes.len();
             let known: Vec<f32> = from.get_exactly(count * lanes)?;
-            let figures: Vec<[f32; 2]> = from.get_exactly(count)?;
+            let figures: Vec<[f32; 3]> = from.get_exactly(count)?;
             self.refinement.direct = direct::Direct::known(&leaves, nodes, lanes, &known, &figures);
         }
         self.refinement.direct.rays = from.get()?;
@@ -286,6 +286,7 @@ impl Bake {
             leaves,
             white,
             through,
+            tilts: self.refinement.leaf_rays.tilts.clone(),
             ..Light::default()
         };
         Ok((reflected, traces))

@@ -75,6 +75,8 @@ pub(crate) struct Direct {
     half_range: Vec<f32>,
     /// Mean brightness of the whole leaf over that of the part others see.
     whole: Vec<f32>,
+    /// Covariance of brightness with openness (does a ray end further away than close by?), over mean brightness.
+    with_openness: Vec<f32>,
     /// Where each leaf's light comes from: a range of `bytes`; empty unless kept. The traces of leaves that were split stay
     /// among the bytes: each level below takes four times as many.
     traces: Vec<Range<usize>>,
@@ -84,14 +86,14 @@ pub(crate) struct Direct {
 }
 
 impl Direct {
-    /// What is known of `leaves`, as read from a file: a row of `width` lanes and two figures each, see
+    /// What is known of `leaves`, as read from a file: a row of `width` lanes and three figures each, see
     /// [`figures`](Self::figures).
     pub(super) fn known(
         leaves: &[u32],
         nodes: usize,
         width: usize,
         rows: &[f32],
-        figures: &[[f32; 2]],
+        figures: &[[f32; 3]],
     ) -> Self {
         let mut known = Self {
             width,
@@ -99,18 +101,30 @@ impl Direct {
             rows: rows.to_vec(),
             half_range: vec![0.0; nodes],
             whole: vec![1.0; nodes],
+            with_openness: vec![0.0; nodes],
             ..Self::default()
         };
         for (k, &leaf) in leaves.iter().enumerate() {
             known.place[leaf as usize] = k as u32;
-            [known.half_range[leaf as usize], known.whole[leaf as usize]] = figures[k];
+            known.put_figures(leaf, figures[k]);
         }
         known
     }
 
     /// What is known of a leaf besides its row.
-    pub(super) fn figures(&self, leaf: u32) -> [f32; 2] {
-        [self.half_range[leaf as usize], self.whole[leaf as usize]]
+    pub(super) fn figures(&self, leaf: u32) -> [f32; 3] {
+        [&self.half_range, &self.whole, &self.with_openness].map(|list| list[leaf as usize])
+    }
+
+    fn put_figures(&mut self, leaf: u32, figures: [f32; 3]) {
+        let lists = [
+            &mut self.half_range,
+            &mut self.whole,
+            &mut self.with_openness,
+        ];
+        for (list, figure) in lists.into_iter().zip(figures) {
+            list[leaf as usize] = figure;
+        }
     }
 
     /// Where the light of leaves comes from, as read from a file.
@@ -141,6 +155,7 @@ impl Direct {
             + size_of_val(self.free.as_slice())
             + size_of_val(self.half_range.as_slice())
             + size_of_val(self.whole.as_slice())
+            + size_of_val(self.with_openness.as_slice())
             + size_of_val(self.traces.as_slice())
             + self.bytes.len()
     }
@@ -149,6 +164,14 @@ impl Direct {
     pub(super) fn whole(&self, leaf: u32) -> f32 {
         // Unknown where light was replayed: then leaves count as even.
         self.whole.get(leaf as usize).copied().unwrap_or(1.0)
+    }
+
+    /// Covariance of brightness with openness over a leaf, over mean brightness.
+    pub(super) fn with_openness(&self, leaf: u32) -> f32 {
+        self.with_openness
+            .get(leaf as usize)
+            .copied()
+            .unwrap_or(0.0)
     }
 
     /// Direct irradiance of a leaf by lane.
@@ -161,7 +184,7 @@ impl Direct {
     }
 
     /// Puts a row in a free place.
-    fn put(&mut self, leaf: u32, row: &[f32], figures: [f32; 2]) {
+    fn put(&mut self, leaf: u32, row: &[f32], figures: [f32; 3]) {
         self.forget(leaf as usize);
         let place = match self.free.pop() {
             Some(place) => {
@@ -175,7 +198,7 @@ impl Direct {
             }
         };
         self.place[leaf as usize] = place;
-        [self.half_range[leaf as usize], self.whole[leaf as usize]] = figures;
+        self.put_figures(leaf, figures);
     }
 
     /// Frees the row of a node that is a leaf no longer.
@@ -235,6 +258,7 @@ impl Direct {
             self.place.resize(tree.nodes.len(), NONE);
             self.half_range.resize(tree.nodes.len(), 0.0);
             self.whole.resize(tree.nodes.len(), 1.0);
+            self.with_openness.resize(tree.nodes.len(), 0.0);
             let landed = look.landed(tree);
             let stake = |leaf: u32| {
                 let stake = Stake::new(tree, leaf, demand);
@@ -268,7 +292,8 @@ impl Direct {
                 self.rays += part.rays;
                 for (k, &(leaf, _)) in leaves.iter().enumerate() {
                     let row = &part.rows[k * self.width..(k + 1) * self.width];
-                    self.put(leaf, row, [part.half_range[k], part.whole[k]]);
+                    let figures = [part.half_range[k], part.whole[k], part.with_openness[k]];
+                    self.put(leaf, row, figures);
                     self.keep_trace(leaf, part.traces[k].as_deref());
                 }
             }
@@ -355,8 +380,9 @@ pub(crate) trait LeafSampler: Sync {
     fn landed(&self, tree: &Tree) -> Landed;
     /// Are leaves gathered at random points and weighted by openness?
     fn by_chance(&self) -> bool;
-    /// How open a point is, found from a few rays: the share of them that meet fronts.
-    fn openness(&self, tree: &Tree, to: &Receiver, memory: &mut Memory) -> f32;
+    /// How open a point of a leaf is, found from a few rays: the share of them that meet fronts, and of those that do so further away
+    /// than close by.
+    fn openness(&self, tree: &Tree, to: &Receiver, memory: &mut Memory) -> [f32; 2];
 }
 
 /// A point of a leaf.
@@ -396,7 +422,7 @@ fn by_rule(
         }
         let to = receiver(tree, leaf, at, u64::from(leaf) << 4 | k as u64);
         if let Some(row) = look.direct(tree, &to, tolerance, memory) {
-            mean.add(&row, weight as f32, look.weights(), memory);
+            mean.add(&row, [weight as f32; 2], look.weights(), memory);
         }
     }
     mean.half_range = mean.half_range();
@@ -426,8 +452,9 @@ fn by_chance(
             let at = triangle_weights(sequence02(k as u32, shift));
             let to = receiver(tree, leaf, at, u64::from(leaf) << 9 | k as u64);
             if let Some(row) = look.direct(tree, &to, tolerance, memory) {
-                let weight = look.openness(tree, &to, memory).max(UNSEEN);
-                mean.add(&row, weight, look.weights(), memory);
+                let [open, far] = look.openness(tree, &to, memory);
+                let weights = [open.max(UNSEEN), far];
+                mean.add(&row, weights, look.weights(), memory);
             }
         }
     };

@@ -78,7 +78,7 @@ impl Bake {
             }
         }
         let nodes = self.refinement.tree.nodes.len();
-        let even = vec![[0.0, 1.0]; leaves.len()];
+        let even = vec![[0.0, 1.0, 0.0]; leaves.len()];
         self.refinement.direct = Direct::known(&leaves, nodes, BANDS, &rows, &even);
         let emitted = self
             .refinement

@@ -9,7 +9,7 @@ use super::room::{Room, by_rays};
 use super::solution::Solution;
 use crate::geometry::sampling::{cosine_direction, hash, sequence02};
 use crate::hierarchy::{NONE, Tree};
-use crate::light::{Neighbours, Rows, padded, weighed};
+use crate::light::{Neighbours, Rows, close_by, padded, weighed};
 use crate::link::{Demand, Sight};
 use crate::team::Interrupted;
 use crate::transport::{Gatherer, Memory, Receiver};
@@ -96,7 +96,7 @@ impl LeafSampler for LampLightSampler<'_> {
         by_rays(self.sight)
     }
 
-    fn openness(&self, tree: &Tree, to: &Receiver, memory: &mut Memory) -> f32 {
+    fn openness(&self, tree: &Tree, to: &Receiver, memory: &mut Memory) -> [f32; 2] {
         let shift = hash(to.seed, 5);
         let directions: [Vec3; OPEN_RAYS] = std::array::from_fn(|k| {
             cosine_direction(to.normal, sequence02(k as u32, shift)).as_vec3()
@@ -105,8 +105,10 @@ impl LeafSampler for LampLightSampler<'_> {
         let from = [to.point.as_vec3(); OPEN_RAYS];
         self.sight.meet(&from, &directions, to.plane, &mut hits);
         memory.rays += OPEN_RAYS as u64;
-        let front = |hit: &&_| tree.met(hit) != NONE;
-        hits.iter().flatten().filter(front).count() as f32 / OPEN_RAYS as f32
+        let near = to.leaf.map_or(0.0, |leaf| close_by(tree.node(leaf).area));
+        let fronts = || hits.iter().flatten().filter(|hit| tree.met(hit) != NONE);
+        let far = fronts().filter(|hit| hit.t >= near).count();
+        [fronts().count(), far].map(|count| count as f32 / OPEN_RAYS as f32)
     }
 }
 

@@ -15,18 +15,21 @@
 
 mod hits;
 mod kept;
+mod tilt;
 
 use super::flux::Closed;
 use super::tinted::Tints;
 use crate::geometry::sampling::{cosine_direction, hash, sequence02};
-use crate::hierarchy::{NONE, Tree, leaf_below};
+use crate::hierarchy::{NONE, Tree, place_below};
 use crate::light::rows::Rows;
+use crate::light::{Place, Tilts, place};
 use crate::link::Sight;
 use crate::team::{Interrupt, Interrupted, Team};
 use crate::transport::hemisphere::{BEAM, Hemisphere};
 use glam::{DVec3, Vec3};
-use hits::{ALONE, LeafHits, RayEnd, RayPairs, look_from, start};
+use hits::{ALONE, LeafHits, MET, RayEnd, RayPairs, look_from, start};
 use rayon::prelude::*;
+pub(super) use tilt::DirectLight;
 
 /// Rays that tell how much of a leaf's light meets fronts: for a leaf of mean area, the least, and the most.
 const LEAF_RAYS: [usize; 3] = [64, 32, 1024];
@@ -60,8 +63,12 @@ pub(crate) struct LeafRays {
     lamps: Vec<u32>,
     /// First end of each node's rays ([`NONE`] if they are another rank's), and how many there are.
     range: Vec<(u32, u32)>,
-    /// The leaf of the present hierarchy at each end, maybe with the flag [`ALONE`]; [`NONE`] where no front was met.
+    /// The leaf of the present hierarchy at each end, maybe with flags (see `hits`); [`NONE`] where no front was met.
     met: Vec<u32>,
+    /// Where on that leaf it lies.
+    places: Vec<Place>,
+    /// How the light of leaves is tilted, see [`tilt`].
+    pub(super) tilts: Tilts,
 }
 
 /// How much was known when it was taken down: nodes, rays, rays by mirrors, and the filters that rays pass.
@@ -248,19 +255,21 @@ impl LeafRays {
     pub(super) fn find(&mut self, tree: &Tree, first: usize) {
         // Nodes lie far apart in memory, and the look-up needs only their children.
         let children: Vec<u32> = tree.nodes.iter().map(|node| node.child).collect();
-        let stands = |met: u32| children[(met & !ALONE) as usize] == NONE;
+        let stands = |met: u32| children[(met & MET) as usize] == NONE;
         let leaf_at = |end: &RayEnd| {
             let [v, w] = end.at.map(|x| f64::from(x) / 65536.0);
-            let face = tree.face_node[(end.entry & !ALONE) as usize];
-            let leaf = leaf_below(face, [1.0 - v - w, v, w], |k| children[k as usize]);
-            leaf | end.entry & ALONE
+            let face = tree.face_node[(end.entry & MET) as usize];
+            let (leaf, weights) = place_below(face, [1.0 - v - w, v, w], |k| children[k as usize]);
+            (leaf | end.entry & !MET, place(weights))
         };
         let known = self.met.len();
         self.met.resize(self.ends.len(), NONE);
-        let rays = self.met.par_iter_mut().zip(&self.ends).enumerate();
-        rays.skip(first).for_each(|(k, (met, end))| {
+        self.places.resize(self.ends.len(), Place::default());
+        let found = self.met.par_iter_mut().zip(&mut self.places);
+        let rays = found.zip(&self.ends).enumerate();
+        rays.skip(first).for_each(|(k, ((met, place), end))| {
             if end.entry != NONE && !(k < known && stands(*met)) {
-                *met = leaf_at(end);
+                (*met, *place) = leaf_at(end);
             }
         });
     }
@@ -285,13 +294,15 @@ impl LeafRays {
         self.lamps.truncate(to.lamps);
         self.tints.shrink(to.ends, to.filters);
         self.met.truncate(to.ends);
+        self.places.truncate(to.ends);
+        self.tilts.0.truncate(to.nodes);
         let met = self.met.par_iter_mut().filter(|met| **met != NONE);
         met.for_each(|met| {
-            let mut leaf = *met & !ALONE;
+            let mut leaf = *met & MET;
             while leaf as usize >= to.nodes {
                 leaf = tree.node(leaf).parent;
             }
-            *met = leaf | *met & ALONE;
+            *met = leaf | *met & !MET;
         });
     }
 
@@ -305,7 +316,7 @@ impl LeafRays {
         // The flag is the highest bit, and set in [`NONE`] as well.
         let counted = |_, k: u32| Some(k).filter(|k| k & ALONE == 0);
         let share = |leaf| 1.0 / self.met(leaf).1;
-        self.means::<L>(leaves, nodes, out, share, counted);
+        self.means::<L>(leaves, nodes, out, share, (&self.tilts, counted));
     }
 
     /// Irradiance of each leaf, by leaf, from lamps in mirrors that only rays find; `emitted` is the exitance of every patch. None
@@ -324,7 +335,13 @@ impl LeafRays {
         };
         let share = |leaf| 1.0 / self.met(leaf).1;
         let mut out = Rows::zero(leaves.len(), L);
-        self.means::<L>(leaves, emitted, &mut out, share, counted);
+        self.means::<L>(
+            leaves,
+            emitted,
+            &mut out,
+            share,
+            (&Tilts::default(), counted),
+        );
         Some(out)
     }
 
@@ -335,24 +352,25 @@ impl LeafRays {
         nodes: &Rows,
         out: &mut Rows,
     ) {
-        let counted = |_, k: u32| (k != NONE).then_some(k & !ALONE);
+        let counted = |_, k: u32| (k != NONE).then_some(k);
         let share = |leaf| 1.0 / self.ends_of(leaf).len().max(1) as f32;
-        self.means::<L>(leaves, nodes, out, share, counted);
+        self.means::<L>(leaves, nodes, out, share, (&self.tilts, counted));
     }
 
-    /// Sums, for each leaf, over the patches its rays met, as far as `counted` keeps them, times `share`.
+    /// Sums, for each leaf, over the patches its rays met, tilted, as far as `counted` keeps them, times `share`.
     fn means<const L: usize>(
         &self,
         leaves: &[u32],
         nodes: &Rows,
         out: &mut Rows,
         share: impl Fn(u32) -> f32 + Sync,
-        counted: impl Fn(usize, u32) -> Option<u32> + Sync,
+        (tilts, counted): (&Tilts, impl Fn(usize, u32) -> Option<u32> + Sync),
     ) {
         let nodes = nodes.all::<L>();
         let row = |leaf: u32| {
             let share = share(leaf);
-            self.sum::<L>(leaf, nodes, &counted).map(|x| x * share)
+            self.sum::<L>(leaf, nodes, (tilts, &counted))
+                .map(|x| x * share)
         };
         let out = out.all_mut::<L>();
         if self.team.is_alone() {
@@ -371,45 +389,46 @@ impl LeafRays {
         self.team.merge_rows(leaves, &rows, out);
     }
 
-    /// The sum over the patches that the rays of one of this rank's leaves met, as far as `counted` keeps them; in rooms without
-    /// panes and mirrors rays have no number.
+    /// The sum over the patches that the rays of one of this rank's leaves met, as far as `counted` keeps them.
     fn sum<const L: usize>(
         &self,
         leaf: u32,
         nodes: &[[f32; L]],
-        counted: impl Fn(usize, u32) -> Option<u32>,
+        (tilts, counted): (&Tilts, impl Fn(usize, u32) -> Option<u32>),
     ) -> [f32; L] {
-        let met = self.ends_of(leaf);
+        let first = self.range[leaf as usize].0 as usize;
         let mut sum = [0.0_f32; L];
-        if self.tints.is_empty() {
-            for node in met.iter().filter_map(|&k| counted(0, k)) {
-                for (s, x) in sum.iter_mut().zip(&nodes[node as usize]) {
-                    *s += x;
-                }
-            }
-        } else {
-            let first = self.range[leaf as usize].0 as usize;
-            for (ray, &met) in (first..).zip(met) {
-                let Some(node) = counted(ray, met) else {
-                    continue;
-                };
-                let tint = self.tints.row::<L>(ray).unwrap_or(&[1.0; L]);
-                for ((s, x), t) in sum.iter_mut().zip(&nodes[node as usize]).zip(tint) {
-                    *s += x * t;
+        for (ray, &met) in (first..).zip(self.ends_of(leaf)) {
+            let Some(node) = counted(ray, met).map(|met| met & MET) else {
+                continue;
+            };
+            let tilt = tilts.at(node, self.places[ray]);
+            let row = &nodes[node as usize];
+            match self.tints.row::<L>(ray) {
+                None => (sum.iter_mut().zip(row)).for_each(|(s, x)| *s += tilt * x),
+                Some(tint) => {
+                    for ((s, x), t) in sum.iter_mut().zip(row).zip(tint) {
+                        *s += tilt * x * t;
+                    }
                 }
             }
         }
         sum
     }
 
-    /// The patches met by those rays of a leaf that count, and the divisor of the sum over them for the leaf's
+    /// The patches met by those rays of a leaf that count with their tilts, and the divisor of the sum over them for the leaf's
     /// irradiance.
-    pub(super) fn met(&self, leaf: u32) -> (impl Iterator<Item = u32>, f32) {
+    pub(super) fn met(&self, leaf: u32) -> (impl Iterator<Item = (u32, f32)>, f32) {
         let met = self.ends_of(leaf);
         let fronts = (self.bare[leaf as usize] * met.len() as f32).round();
+        let first = self.range[leaf as usize].0 as usize;
         // The flag is the highest bit, and set in [`NONE`] as well.
-        let counted = met.iter().copied().filter(|&k| k & ALONE == 0);
-        (counted, fronts.max(1.0))
+        let counted = (first..).zip(met).filter(|(_, met)| **met & ALONE == 0);
+        let tilted = counted.map(|(ray, met)| {
+            let leaf = met & MET;
+            (leaf, self.tilts.at(leaf, self.places[ray]))
+        });
+        (tilted, fronts.max(1.0))
     }
 
     fn ends_of(&self, leaf: u32) -> &[u32] {
@@ -430,7 +449,7 @@ impl LeafRays {
             }
             let b = match self.met[first as usize + k] {
                 NONE => 0.0,
-                met => f64::from(bright[(met & !ALONE) as usize]),
+                met => f64::from(bright[(met & MET) as usize]),
             };
             let quarter = (pairs.start(k).iter()).position(|&w| w >= 0.5);
             let quarter = quarter.unwrap_or(3);
@@ -454,12 +473,14 @@ impl LeafRays {
 
     /// Bytes of the rows of this rank's leaves.
     pub(crate) fn row_bytes(&self) -> usize {
-        self.tints.bytes() + (size_of::<RayEnd>() + 4) * self.ends.len()
+        self.tints.bytes() + (size_of::<RayEnd>() + size_of::<Place>() + 4) * self.ends.len()
     }
 
     /// Bytes held.
     pub(crate) fn bytes(&self) -> usize {
-        self.row_bytes() + 8 * (self.range.len() + self.target.len())
+        self.row_bytes()
+            + 8 * (self.range.len() + self.target.len())
+            + size_of_val(self.tilts.0.as_slice())
     }
 
     /// The area of every node that takes part; never quite zero, as it is divided by.
@@ -550,6 +571,7 @@ mod tests {
             bare: vec![0.5],
             range: vec![(0, 6)],
             met: vec![1, 2, 1 | ALONE, NONE, NONE, NONE],
+            places: vec![Place::default(); 6],
             ..LeafRays::default()
         };
         let (mut seen, mut whole) = (Rows::zero(1, 4), Rows::zero(1, 4));

@@ -46,14 +46,15 @@ impl Senders<'_> {
             Senders::Links(operator) => operator.received_lists(sent, cmf),
             Senders::Rays(rays, all) => table(leaves, |k| {
                 let (met, fronts) = rays.met(all[k]);
-                let mut ends: Vec<u32> = met.collect();
-                ends.sort_unstable();
+                let mut ends: Vec<(u32, f32)> = met.collect();
+                ends.sort_by_key(|end| end.0);
                 let (mut sum, mut one) = (SpectralList::black(), SpectralList::black());
-                for same in ends.chunk_by(|a, b| a == b) {
+                for same in ends.chunk_by(|a, b| a.0 == b.0) {
                     // Rays end on leaves.
-                    let place = all.binary_search(&same[0]).ok()?;
+                    let place = all.binary_search(&same[0].0).ok()?;
                     if sent.get(place, &mut one) {
-                        sum.add_scaled(same.len() as f64 / f64::from(fronts), &one, cmf);
+                        let rays: f64 = same.iter().map(|end| f64::from(end.1)).sum();
+                        sum.add_scaled(rays / f64::from(fronts), &one, cmf);
                     }
                 }
                 Some(sum)

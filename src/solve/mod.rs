@@ -130,6 +130,8 @@ pub(crate) struct SolveInput {
     pub(crate) emitted: Option<Rows>,
     /// Relative error at which the solve ends.
     pub(crate) tolerance: f64,
+    /// Are the tilts of leaves found anew? Under other lamps they stay, so that light stays linear in its lamps.
+    pub(crate) tilts: bool,
     /// Is a record asked for of where the light went?
     pub(crate) counted: bool,
 }

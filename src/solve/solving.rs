@@ -2,6 +2,7 @@
 
 use super::fluorescing::{Glow, Rounds};
 use super::flux::{self, Closed};
+use super::leaf_rays::DirectLight;
 use super::linear;
 use super::list_bounces::{ListBounces, Senders};
 use super::mixed::Mixed;
@@ -96,6 +97,7 @@ impl Bake {
             reflected: self.solution.guess::<L>(&self.refinement.tree, leaves),
             emitted: None,
             tolerance: self.room.tolerance(),
+            tilts: self.room.by_rays(),
             counted: true,
         };
         let solved = self.solve_with::<L>(rows, leaves, input);
@@ -116,6 +118,7 @@ impl Bake {
             mut reflected,
             emitted,
             tolerance,
+            tilts,
             counted,
         } = input;
         let emission = sources.emission;
@@ -134,19 +137,12 @@ impl Bake {
         };
         let sums = self.sums_of(rows);
         let runs = self.room.plan.runs(EffectKind::Interreflection);
-        let bounced = if runs {
-            let lit = BounceStart {
-                leaves,
-                links: rows,
-                first: &first,
-                reflection: &reflection,
-                receive: &*self.receive::<L>(rows, leaves),
-                tolerance,
-            };
-            self.all_bounces::<L>(&lit, rows, &sums, sources.glow.as_ref(), &mut reflected)
-        } else {
-            Bounced::none::<L>(leaves.len())
-        };
+        let bounced = self.bounced::<L>(
+            (rows, leaves, &sums),
+            (&first, &reflection, sources.glow.as_ref()),
+            (tolerance, tilts),
+            &mut reflected,
+        );
         scaled.reflected = bounced.ratio;
         let (mut irradiance, given) = (bounced.irradiance, bounced.given);
         step::<L>(&mut irradiance, &first, [1.0; L]);
@@ -178,6 +174,67 @@ impl Bake {
         self.solution.light.through = through;
         self.shine(leaves, emitted, on_nodes, irradiance);
         (bounced.convergence, flux)
+    }
+
+    /// All bounces, where they run. If `tilts` are asked for, leaves are tilted before by what they reflected in the last round; in the
+    /// first by a solve without.
+    fn bounced<const L: usize>(
+        &mut self,
+        (rows, leaves, sums): (&LinkRows, &[u32], &[f64]),
+        (first, reflection, glow): (&Rows, &Reflection, Option<&Glow>),
+        (tolerance, tilts): (f64, bool),
+        reflected: &mut Rows,
+    ) -> Bounced {
+        if !self.room.plan.runs(EffectKind::Interreflection) {
+            return Bounced::none::<L>(leaves.len());
+        }
+        let bounce = |bake: &Self, reflected: &mut Rows| {
+            let lit = BounceStart {
+                leaves,
+                links: rows,
+                first,
+                reflection,
+                receive: &*bake.receive::<L>(rows, leaves),
+                tolerance,
+            };
+            bake.all_bounces::<L>(&lit, rows, sums, glow, reflected)
+        };
+        let mut before = 0;
+        if tilts {
+            if reflected.all::<L>().iter().all(|row| *row == [0.0; L]) {
+                before = bounce(self, reflected).convergence.iterations;
+            }
+            self.tilt_leaves::<L>(leaves, first, reflected);
+        }
+        let mut bounced = bounce(self, reflected);
+        bounced.convergence.iterations += before;
+        bounced
+    }
+
+    /// Finds how the light of leaves is tilted, by their direct light and what they receive besides.
+    fn tilt_leaves<const L: usize>(&mut self, leaves: &[u32], first: &Rows, reflected: &Rows) {
+        let lanes = &self.solution.lanes;
+        let nodes = self.refinement.tree.nodes.len();
+        let bright = |rows: &Rows| {
+            let mut bright = vec![0.0_f32; nodes];
+            for (&leaf, row) in leaves.iter().zip(rows.all::<L>()) {
+                bright[leaf as usize] = lanes.notice(row).into_iter().sum::<f64>() as f32;
+            }
+            bright
+        };
+        let refinement = &mut self.refinement;
+        let direct = bright(first);
+        let with_openness = (0..nodes).zip(&direct);
+        let with_openness: Vec<f32> = with_openness
+            .map(|(k, bright)| bright * refinement.direct.with_openness(k as u32))
+            .collect();
+        let direct = DirectLight {
+            bright: &direct,
+            with_openness: &with_openness,
+        };
+        let room = (&refinement.tree, leaves, self.room.settings.seed);
+        let reflected = bright(reflected);
+        (refinement.leaf_rays).tilt(room, &reflected, &direct, &refinement.areas);
     }
 
     /// Matrices of the paints, where lanes are not bands.
@@ -479,6 +536,7 @@ impl Bake {
             mirrors: std::mem::take(&mut self.solution.light.mirrors),
             white: self.solution.light.white,
             half_size: self.room.mesh.half_size,
+            tilts: self.refinement.leaf_rays.tilts.clone(),
             apart: self.solution.lanes.excites().is_some(),
             ..Light::default()
         };

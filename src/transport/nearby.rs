@@ -159,7 +159,8 @@ impl Gatherer<'_> {
                 path.through *= self.left_by(Some(&self.along(&mirrored.route)));
                 next = mirrored.hit;
             }
-            let Some((leaf, hit)) = next.and_then(|hit| Some((self.met(&hit)?, hit))) else {
+            let found = next.and_then(|hit| Some((self.met_at(&hit)?, hit)));
+            let Some(((leaf, place), hit)) = found else {
                 continue;
             };
             if let (Some(glass), None) = (&self.glass, &mirrored) {
@@ -174,7 +175,9 @@ impl Gatherer<'_> {
                 path.sum += path.through * share * emitted;
             }
             if last(leaf, &hit) {
-                path.sum += path.through * f64::from(self.light.bright_reflected[leaf as usize]);
+                let bright =
+                    self.light.tilts.at(leaf, place) * self.light.bright_reflected[leaf as usize];
+                path.sum += path.through * f64::from(bright);
             } else {
                 self.set_out(path, leaf, &hit, sides);
             }

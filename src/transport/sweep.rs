@@ -7,7 +7,7 @@ use super::via::Arrived;
 use crate::geometry::Hit;
 use crate::geometry::sampling::tangents;
 use crate::hierarchy::NONE;
-use crate::light::{Passage, accumulate};
+use crate::light::{Passage, Place, accumulate};
 use crate::link::{POLYGONS, pattern};
 use glam::{DVec3, Vec3};
 
@@ -32,11 +32,12 @@ impl Gatherer<'_> {
         let mut escaped = std::mem::take(&mut memory.escaped);
         let mut tints = std::mem::take(&mut memory.tints);
         let mut mirrored = std::mem::take(&mut memory.mirrored);
-        let ends = (&mut met, &mut mirrored);
+        let mut tilts = std::mem::take(&mut memory.tilts);
+        let ends = (&mut met, &mut tilts, &mut mirrored);
         let backs = self.cast(to, hemisphere, ends, &mut tints, &mut escaped);
         out.backs = share * backs as f64;
         (memory.met, memory.tints, memory.escaped) = (met, tints, escaped);
-        memory.mirrored = mirrored;
+        (memory.mirrored, memory.tilts) = (mirrored, tilts);
         memory.rays += hemisphere.len() as u64;
         if out.backs > self.most_backs {
             return;
@@ -113,9 +114,11 @@ impl Gatherer<'_> {
                 near_rays.push(ray);
                 continue;
             }
-            add(leaf, share, ray);
+            let tilt = memory.tilts[ray];
+            add(leaf, share * tilt, ray);
             if let Some(trace) = &mut out.trace {
                 trace.hit(leaf, share, tint(ray));
+                trace.slope(leaf, share * (tilt - 1.0), tint(ray));
             }
         }
         let how = (f64::from(share), out.backs);
@@ -135,12 +138,13 @@ impl Gatherer<'_> {
         &self,
         to: &Receiver,
         hemisphere: &Hemisphere,
-        (met, mirrored): (&mut Vec<(u32, Hit)>, &mut Vec<Arrived>),
+        (met, tilts, mirrored): (&mut Vec<(u32, Hit)>, &mut Vec<f32>, &mut Vec<Arrived>),
         tints: &mut Vec<Option<Box<Passage>>>,
         escaped: &mut Vec<DVec3>,
     ) -> usize {
         escaped.clear();
         tints.clear();
+        tilts.clear();
         mirrored.clear();
         // Another seed rotates the pattern.
         let (sin, cos) = (pattern(to.seed, 0, 0)[0] * std::f64::consts::TAU).sin_cos();
@@ -165,9 +169,10 @@ impl Gatherer<'_> {
                 if self.follow(from[0], *d, hit, mirrored) {
                     continue;
                 }
-                match self.met(hit) {
-                    Some(leaf) => {
+                match self.met_at(hit) {
+                    Some((leaf, place)) => {
                         met.push((leaf, *hit));
+                        tilts.push(self.light.tilts.at(leaf, place));
                         if let Some(glass) = &self.glass {
                             let end = from[0] + *d * hit.t;
                             let tint = glass.through(from[0], end, self.steps());
@@ -183,12 +188,17 @@ impl Gatherer<'_> {
 
     /// The smallest patch of the solution at a hit; none on a back without a face.
     pub(super) fn met(&self, hit: &Hit) -> Option<u32> {
+        self.met_at(hit).map(|(leaf, _)| leaf)
+    }
+
+    /// The same, and where on the patch the hit lies.
+    pub(super) fn met_at(&self, hit: &Hit) -> Option<(u32, Place)> {
         let entry = self.tree.met(hit);
         if entry == NONE {
             return None;
         }
         let weights = weights_on_face(hit);
-        Some(self.light.descent.leaf_at(self.tree, entry, weights))
+        Some(self.light.descent.place_at(self.tree, entry, weights))
     }
 }
 
@@ -275,7 +285,7 @@ mod tests {
             for leaf in bake.tree().leaves().step_by(17) {
                 let to = middle(bake.tree(), leaf);
                 let mut met = Vec::new();
-                let ends = (&mut met, &mut Vec::new());
+                let ends = (&mut met, &mut Vec::new(), &mut Vec::new());
                 let backs = fine.cast(&to, hemisphere, ends, &mut Vec::new(), &mut Vec::new());
                 let how = (share, share * backs as f64);
                 met.retain(|(leaf, hit)| fine.is_near(*leaf, hit, how.1));

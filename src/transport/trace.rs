@@ -2,12 +2,12 @@
 //!
 //! Light is linear: with the patches k that a point gathered and their visible factors w_k frozen,
 //! `H(p) = scale sum (w_k + s_k) R_k + sum w_k E_k + sum f_l I_l + share sum n_j R_j` over patches (reflected R, emitted E,
-//! slopes s over their siblings), lamps (factor f, intensity I) and the leaves j that n_j of its rays over the hemisphere met.
+//! slopes s over their siblings and tilts of leaves), lamps (factor f, intensity I) and the leaves j that n_j of its rays over the hemisphere met.
 //!
 //! Each term of light that came through panes or by way of mirrors is multiplied by what these leave; see [`tinted`].
 //!
 //! In the packed form ids are sorted and stored as differences in base 128: a patch takes about 6 bytes, a leaf that
-//! rays met about 2.
+//! rays met about 2, and as much as a patch for its tilt.
 
 mod bytes;
 mod tinted;

@@ -24,6 +24,8 @@ pub(super) struct LeafSamples {
     pub(super) half_range: Vec<f32>,
     /// Mean brightness of the whole leaf over that of the part others see.
     pub(super) whole: Vec<f32>,
+    /// Covariance of brightness with openness, over mean brightness.
+    pub(super) with_openness: Vec<f32>,
     /// Where the light comes from, if that is kept.
     pub(super) traces: Vec<Option<Box<[u8]>>>,
     pub(super) rays: u64,
@@ -34,6 +36,7 @@ impl Packed for LeafSamples {
         self.rows.pack(to);
         self.half_range.pack(to);
         self.whole.pack(to);
+        self.with_openness.pack(to);
         self.traces.pack(to);
         self.rays.pack(to);
     }
@@ -43,6 +46,7 @@ impl Packed for LeafSamples {
             rows: Packed::unpack(from)?,
             half_range: Packed::unpack(from)?,
             whole: Packed::unpack(from)?,
+            with_openness: Packed::unpack(from)?,
             traces: Packed::unpack(from)?,
             rays: from.get()?,
         })
@@ -56,6 +60,8 @@ pub(super) struct Mean {
     /// Range of brightness, and the sums of it with weights and without.
     range: [f64; 2],
     pub(super) bright: [f64; 2],
+    /// Sums of the weights of what goes far, and of brightness with them.
+    far: [f64; 2],
     pub(super) points: usize,
     /// Over open points: their number, and sums of brightness, its square and the variance due to rays to lamps.
     open: [f64; 4],
@@ -71,6 +77,7 @@ impl Mean {
             total: 0.0,
             range: [f64::INFINITY, 0.0],
             bright: [0.0; 2],
+            far: [0.0; 2],
             points: 0,
             open: [0.0; 4],
             trace: None,
@@ -78,10 +85,11 @@ impl Mean {
         }
     }
 
+    /// Adds a point: the weight of all that it sees, and of what lies further away than close by.
     pub(super) fn add(
         &mut self,
         row: &[f32; 64],
-        weight: f32,
+        [weight, far]: [f32; 2],
         weights: &[f64],
         memory: &mut Memory,
     ) {
@@ -101,6 +109,8 @@ impl Mean {
             let more = [1.0, bright, bright * bright, memory.noise];
             self.open = std::array::from_fn(|k| self.open[k] + more[k]);
         }
+        let far = f64::from(far);
+        self.far = [self.far[0] + far, self.far[1] + far * bright];
         self.bright = [
             self.bright[0] + f64::from(weight) * bright,
             self.bright[1] + bright,
@@ -146,6 +156,12 @@ impl Mean {
         found
             .whole
             .push(if seen > 0.0 { (all / seen) as f32 } else { 1.0 });
+        let total = f64::from(self.total) * self.bright[0];
+        found.with_openness.push(if total > 0.0 {
+            (self.far[1] / self.bright[0] - self.far[0] / f64::from(self.total)) as f32
+        } else {
+            0.0
+        });
         let trace = self.trace.map(|trace| trace.times(share).pack());
         found.traces.push(trace);
     }

@@ -33,8 +33,8 @@ impl LeafSampler for Fake {
     fn by_chance(&self) -> bool {
         true
     }
-    fn openness(&self, _: &Tree, to: &Receiver, _: &mut Memory) -> f32 {
-        (self.open)(to)
+    fn openness(&self, _: &Tree, to: &Receiver, _: &mut Memory) -> [f32; 2] {
+        [(self.open)(to); 2]
     }
 }
 
@@ -94,7 +94,7 @@ fn points_have_a_variance_and_a_range() {
     let mean = |bright: &[f32]| {
         let mut mean = Mean::new();
         for &b in bright {
-            mean.add(&[b; 64], 1.0, &[1.0], &mut Memory::default());
+            mean.add(&[b; 64], [1.0; 2], &[1.0], &mut Memory::default());
         }
         mean
     };

@@ -3,6 +3,7 @@
 use crate::geometry::Hit;
 use crate::geometry::sampling::{hash, sequence02, tangents, triangle_weights};
 use crate::hierarchy::{NONE, Tree};
+use crate::light::close_by;
 use crate::light::passed::{self, Passed, Steps};
 use crate::link::Sight;
 use crate::transport::hemisphere::{BEAM, Hemisphere};
@@ -10,11 +11,15 @@ use glam::Vec3;
 
 /// Flag of a face or leaf met by a ray whose fellow (the other ray from its point) met no front.
 pub(super) const ALONE: u32 = 1 << 31;
+/// Flag of a face or leaf met by a ray whose fellow met a front close by.
+pub(super) const BESIDE: u32 = 1 << 30;
+/// The face or leaf without flags.
+pub(super) const MET: u32 = BESIDE - 1;
 
 /// Where a ray ended.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct RayEnd {
-    /// Entry of the face, maybe with the flag [`ALONE`]; [`NONE`]: the ray left the room or met a black back.
+    /// Entry of the face, maybe with the flag [`ALONE`] or [`BESIDE`]; [`NONE`]: the ray left the room or met a black back.
     pub(super) entry: u32,
     /// Weights of the second and third corner, in 1/65536.
     pub(super) at: [u16; 2],
@@ -58,6 +63,8 @@ pub(super) fn look_from(
         ends: Vec::with_capacity(pattern.len()),
         ..LeafHits::default()
     };
+    let near = close_by(node.area);
+    let mut is_near = Vec::with_capacity(pattern.len());
     let mut hits = [None; BEAM];
     let (mut from, mut directions) = ([Vec3::ZERO; BEAM], [Vec3::ZERO; BEAM]);
     for beam in pattern.beams() {
@@ -71,6 +78,7 @@ pub(super) fn look_from(
                 found.go_on(sight, [from[k], directions[k]], k, hit);
             }
         }
+        is_near.extend(hits.iter().map(|hit| hit.is_some_and(|hit| hit.t < near)));
         found.ends.extend(hits.iter().map(|hit| {
             let Some(hit) = hit else {
                 return RayEnd::NOWHERE;
@@ -86,8 +94,11 @@ pub(super) fn look_from(
     let fronts = found.ends.iter().map(|end| end.entry != NONE);
     let fronts: Vec<bool> = fronts.collect();
     for (k, end) in found.ends.iter_mut().enumerate() {
-        if fronts[k] && !fronts[pairs.fellow(k)] {
+        let fellow = pairs.fellow(k);
+        if fronts[k] && !fronts[fellow] {
             end.entry |= ALONE;
+        } else if fronts[k] && is_near[fellow] {
+            end.entry |= BESIDE;
         }
     }
     found

@@ -4,10 +4,10 @@
 //! of ranks.
 
 use super::LeafRays;
-use super::hits::{ALONE, RayEnd};
+use super::hits::{MET, RayEnd};
 use crate::hierarchy::{NONE, Tree};
-use crate::light::Filters;
 use crate::light::passed::Passed;
+use crate::light::{Filters, Tilts};
 use crate::solve::tinted::{self, Tints};
 use crate::store::codec::{Plain, Read};
 use crate::store::{Broken, Decoder, Encoder};
@@ -20,7 +20,7 @@ const TOGETHER: usize = 1 << 16;
 const LAMP: u32 = 1 << 31;
 
 impl LeafRays {
-    /// Writes the rays: where the rays end, or only the leaves that they met, which is half as much and enough as
+    /// Writes the rays: where the rays end, or only the leaves that they met, which is less and enough as
     /// long as no leaf is split. In a room with panes or mirrors (then there are `filters`) also what the rays pass.
     pub(in crate::solve) fn encode(
         &self,
@@ -40,7 +40,9 @@ impl LeafRays {
             self.encode_rays(out, |k| self.ends[k].at)?;
         } else {
             self.encode_rays(out, |k| self.met[k])?;
+            self.encode_rays(out, |k| self.places[k])?;
         }
+        out.put_all(&self.tilts.0)?;
         match filters {
             Some(filters) => self.encode_passed(filters, out),
             None => Ok(()),
@@ -130,17 +132,19 @@ impl LeafRays {
             let ends = entries.into_iter().zip(places);
             leaf_rays.ends = ends.map(|(entry, at)| RayEnd { entry, at }).collect();
             let faces = tree.faces.len();
-            let there = |e: &RayEnd| e.entry == NONE || ((e.entry & !ALONE) as usize) < faces;
+            let there = |e: &RayEnd| e.entry == NONE || ((e.entry & MET) as usize) < faces;
             if !leaf_rays.ends.iter().all(there) {
                 return Err(Broken::new("has rays that end nowhere"));
             }
         } else {
             leaf_rays.met = leaf_rays.own(&counts, from)?;
-            let there = |&k: &u32| k == NONE || ((k & !ALONE) as usize) < nodes;
+            leaf_rays.places = leaf_rays.own(&counts, from)?;
+            let there = |&k: &u32| k == NONE || ((k & MET) as usize) < nodes;
             if !leaf_rays.met.iter().all(there) {
                 return Err(Broken::new("has rays that end nowhere"));
             }
         }
+        leaf_rays.tilts = Tilts(from.get_all()?);
         if let Some(filters) = filters {
             leaf_rays.decode_passed(&counts, filters, from)?;
         }
