@@ -334,9 +334,10 @@ impl Tree {
 
     /// The leaf element that holds a point of a face, given by barycentric weights on the whole face.
     pub fn leaf_at(&self, entry: u32, weights: [f64; 3]) -> u32 {
-        leaf_below(self.face_node[entry as usize], weights, |k| {
+        place_below(self.face_node[entry as usize], weights, |k| {
             self.node(k).child
         })
+        .0
     }
 
     /// `count` points of a node, each representing an equal share of its area, stratified over the faces of a cluster.
@@ -379,12 +380,7 @@ impl Tree {
     }
 }
 
-/// The leaf that contains a point of a face; `first` gives the first child of a node, [`NONE`] for a leaf.
-fn leaf_below(face: u32, weights: [f64; 3], first: impl Fn(u32) -> u32) -> u32 {
-    place_below(face, weights, first).0
-}
-
-/// The same, and the weights of the point on that leaf.
+/// The leaf that contains a point of a face, and the weights of the point on it; `first` gives the first child of a node, [`NONE`] for a leaf.
 pub(crate) fn place_below(
     face: u32,
     mut weights: [f64; 3],

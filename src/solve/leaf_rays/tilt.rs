@@ -20,7 +20,8 @@ use crate::store::codec::Read;
 use crate::team::Packed;
 use rayon::prelude::*;
 
-/// Pairs of rays that a leaf needs for its openness to have a direction.
+/// Pairs of rays that a leaf needs for its openness to have a direction: one more than a plane has unknowns. Leaves cast twice as many at the
+/// least, so this holds back only those of which most rays meet no front.
 const FEWEST: f64 = 4.0;
 
 /// Direct light at leaves: brightness of the mean, and the covariance of brightness with openness.
