@@ -67,10 +67,11 @@ impl Bake {
     /// Takes back what was done since `before`.
     pub(super) fn take_back(&mut self, before: Before) {
         let refinement = &mut self.refinement;
-        refinement
-            .leaf_rays
-            .shrink(&refinement.tree, &before.leaf_rays);
+        refinement.leaf_rays.shrink(&before.leaf_rays);
         refinement.tree.shrink(&before.tree);
+        refinement.leaf_rays.find(&refinement.tree, 0);
+        let tilts = before.solution.light.tilts.clone();
+        refinement.leaf_rays.tilt_by(tilts);
         refinement.areas = refinement.leaf_rays.areas(&refinement.tree);
         refinement.graph = before.graph;
         refinement.balance = before.balance;
@@ -80,7 +81,6 @@ impl Bake {
         tints.on(&self.solution.filters);
         self.light_up(&before.reflected);
         self.light_arrives();
-        self.refinement.leaf_rays.tilts = self.solution.light.tilts.clone();
         self.solution.light.neighbours =
             Neighbours::new(self.refinement.tree.nodes.len(), &self.refinement.graph);
     }

@@ -29,7 +29,6 @@ use crate::transport::hemisphere::{BEAM, Hemisphere};
 use glam::{DVec3, Vec3};
 use hits::{ALONE, LeafHits, MET, RayEnd, RayPairs, look_from, start};
 use rayon::prelude::*;
-pub(super) use tilt::DirectLight;
 
 /// Rays that tell how much of a leaf's light meets fronts: for a leaf of mean area, the least, and the most.
 const LEAF_RAYS: [usize; 3] = [64, 32, 1024];
@@ -67,6 +66,8 @@ pub(crate) struct LeafRays {
     met: Vec<u32>,
     /// Where on that leaf it lies.
     places: Vec<Place>,
+    /// How bright that leaf is there, as a share of its mean.
+    bright: Vec<f32>,
     /// How the light of leaves is tilted, see [`tilt`].
     pub(super) tilts: Tilts,
 }
@@ -265,13 +266,24 @@ impl LeafRays {
         let known = self.met.len();
         self.met.resize(self.ends.len(), NONE);
         self.places.resize(self.ends.len(), Place::default());
-        let found = self.met.par_iter_mut().zip(&mut self.places);
-        let rays = found.zip(&self.ends).enumerate();
-        rays.skip(first).for_each(|(k, ((met, place), end))| {
-            if end.entry != NONE && !(k < known && stands(*met)) {
-                (*met, *place) = leaf_at(end);
-            }
-        });
+        self.bright.resize(self.ends.len(), 1.0);
+        let found = (&mut self.met, &mut self.places, &mut self.bright);
+        let rays = found.into_par_iter().zip(&self.ends).enumerate();
+        rays.skip(first)
+            .for_each(|(k, ((met, place, bright), end))| {
+                if end.entry != NONE && !(k < known && stands(*met)) {
+                    (*met, *place) = leaf_at(end);
+                    *bright = self.tilts.at(*met & MET, *place);
+                }
+            });
+    }
+
+    /// Takes over how the light of leaves is tilted.
+    pub(super) fn tilt_by(&mut self, tilts: Tilts) {
+        self.tilts = tilts;
+        let ends = (&self.met, &self.places).into_par_iter();
+        let bright = ends.map(|(&met, &place)| self.tilts.at(met & MET, place));
+        bright.collect_into_vec(&mut self.bright);
     }
 
     /// How much is known, for [`LeafRays::shrink`].
@@ -284,8 +296,8 @@ impl LeafRays {
         }
     }
 
-    /// Forgets all that was looked up since `to`; `tree` is the hierarchy as refined since.
-    pub(super) fn shrink(&mut self, tree: &Tree, to: &LeafRaysSize) {
+    /// Forgets the leaves that came since `to`, and which leaf lies at each end.
+    pub(super) fn shrink(&mut self, to: &LeafRaysSize) {
         self.target.truncate(to.nodes);
         self.bare.truncate(to.nodes);
         self.certain.truncate(to.nodes);
@@ -293,17 +305,7 @@ impl LeafRays {
         self.ends.truncate(to.ends);
         self.lamps.truncate(to.lamps);
         self.tints.shrink(to.ends, to.filters);
-        self.met.truncate(to.ends);
-        self.places.truncate(to.ends);
-        self.tilts.0.truncate(to.nodes);
-        let met = self.met.par_iter_mut().filter(|met| **met != NONE);
-        met.for_each(|met| {
-            let mut leaf = *met & MET;
-            while leaf as usize >= to.nodes {
-                leaf = tree.node(leaf).parent;
-            }
-            *met = leaf | *met & !MET;
-        });
+        self.met.clear();
     }
 
     /// Have leaves looked for themselves?
@@ -314,9 +316,9 @@ impl LeafRays {
     /// Irradiance of each leaf by what its rays met, `nodes` being the radiosity of every patch: by leaf.
     pub(super) fn irradiance<const L: usize>(&self, leaves: &[u32], nodes: &Rows, out: &mut Rows) {
         // The flag is the highest bit, and set in [`NONE`] as well.
-        let counted = |_, k: u32| Some(k).filter(|k| k & ALONE == 0);
+        let weight = |ray: usize, met| (met & ALONE == 0).then(|| self.bright[ray]);
         let share = |leaf| 1.0 / self.met(leaf).1;
-        self.means::<L>(leaves, nodes, out, share, (&self.tilts, counted));
+        self.means::<L>(leaves, nodes, out, share, weight);
     }
 
     /// Irradiance of each leaf, by leaf, from lamps in mirrors that only rays find; `emitted` is the exitance of every patch. None
@@ -329,19 +331,13 @@ impl LeafRays {
         if self.team.is_alone() && self.lamps.is_empty() {
             return None;
         }
-        let counted = |ray: usize, k: u32| {
-            let own = k & ALONE == 0 && self.lamps.binary_search(&(ray as u32)).is_ok();
-            own.then_some(k)
+        let weight = |ray: usize, met| {
+            let own = met & ALONE == 0 && self.lamps.binary_search(&(ray as u32)).is_ok();
+            own.then_some(1.0)
         };
         let share = |leaf| 1.0 / self.met(leaf).1;
         let mut out = Rows::zero(leaves.len(), L);
-        self.means::<L>(
-            leaves,
-            emitted,
-            &mut out,
-            share,
-            (&Tilts::default(), counted),
-        );
+        self.means::<L>(leaves, emitted, &mut out, share, weight);
         Some(out)
     }
 
@@ -352,25 +348,24 @@ impl LeafRays {
         nodes: &Rows,
         out: &mut Rows,
     ) {
-        let counted = |_, k: u32| (k != NONE).then_some(k);
+        let weight = |ray: usize, met| (met != NONE).then(|| self.bright[ray]);
         let share = |leaf| 1.0 / self.ends_of(leaf).len().max(1) as f32;
-        self.means::<L>(leaves, nodes, out, share, (&self.tilts, counted));
+        self.means::<L>(leaves, nodes, out, share, weight);
     }
 
-    /// Sums, for each leaf, over the patches its rays met, tilted, as far as `counted` keeps them, times `share`.
+    /// Sums, for each leaf, over the patches its rays met, by `weight` of a ray and what it met if these count, times `share`.
     fn means<const L: usize>(
         &self,
         leaves: &[u32],
         nodes: &Rows,
         out: &mut Rows,
         share: impl Fn(u32) -> f32 + Sync,
-        (tilts, counted): (&Tilts, impl Fn(usize, u32) -> Option<u32> + Sync),
+        weight: impl Fn(usize, u32) -> Option<f32> + Sync,
     ) {
         let nodes = nodes.all::<L>();
         let row = |leaf: u32| {
             let share = share(leaf);
-            self.sum::<L>(leaf, nodes, (tilts, &counted))
-                .map(|x| x * share)
+            self.sum::<L>(leaf, nodes, &weight).map(|x| x * share)
         };
         let out = out.all_mut::<L>();
         if self.team.is_alone() {
@@ -389,26 +384,25 @@ impl LeafRays {
         self.team.merge_rows(leaves, &rows, out);
     }
 
-    /// The sum over the patches that the rays of one of this rank's leaves met, as far as `counted` keeps them.
+    /// The sum over the patches that the rays of one of this rank's leaves met, by `weight`.
     fn sum<const L: usize>(
         &self,
         leaf: u32,
         nodes: &[[f32; L]],
-        (tilts, counted): (&Tilts, impl Fn(usize, u32) -> Option<u32>),
+        weight: impl Fn(usize, u32) -> Option<f32>,
     ) -> [f32; L] {
         let first = self.range[leaf as usize].0 as usize;
         let mut sum = [0.0_f32; L];
         for (ray, &met) in (first..).zip(self.ends_of(leaf)) {
-            let Some(node) = counted(ray, met).map(|met| met & MET) else {
+            let Some(weight) = weight(ray, met) else {
                 continue;
             };
-            let tilt = tilts.at(node, self.places[ray]);
-            let row = &nodes[node as usize];
+            let row = &nodes[(met & MET) as usize];
             match self.tints.row::<L>(ray) {
-                None => (sum.iter_mut().zip(row)).for_each(|(s, x)| *s += tilt * x),
+                None => (sum.iter_mut().zip(row)).for_each(|(s, x)| *s += weight * x),
                 Some(tint) => {
                     for ((s, x), t) in sum.iter_mut().zip(row).zip(tint) {
-                        *s += tilt * x * t;
+                        *s += weight * x * t;
                     }
                 }
             }
@@ -416,18 +410,15 @@ impl LeafRays {
         sum
     }
 
-    /// The patches met by those rays of a leaf that count with their tilts, and the divisor of the sum over them for the leaf's
-    /// irradiance.
+    /// The patches met by those rays of a leaf that count, how bright each is where it was met, as a share of its mean, and the divisor of
+    /// the sum over them for the leaf's irradiance.
     pub(super) fn met(&self, leaf: u32) -> (impl Iterator<Item = (u32, f32)>, f32) {
         let met = self.ends_of(leaf);
         let fronts = (self.bare[leaf as usize] * met.len() as f32).round();
         let first = self.range[leaf as usize].0 as usize;
         // The flag is the highest bit, and set in [`NONE`] as well.
         let counted = (first..).zip(met).filter(|(_, met)| **met & ALONE == 0);
-        let tilted = counted.map(|(ray, met)| {
-            let leaf = met & MET;
-            (leaf, self.tilts.at(leaf, self.places[ray]))
-        });
+        let tilted = counted.map(|(ray, met)| (met & MET, self.bright[ray]));
         (tilted, fronts.max(1.0))
     }
 
@@ -473,7 +464,7 @@ impl LeafRays {
 
     /// Bytes of the rows of this rank's leaves.
     pub(crate) fn row_bytes(&self) -> usize {
-        self.tints.bytes() + (size_of::<RayEnd>() + size_of::<Place>() + 4) * self.ends.len()
+        self.tints.bytes() + (size_of::<RayEnd>() + size_of::<Place>() + 8) * self.ends.len()
     }
 
     /// Bytes held.
@@ -571,7 +562,7 @@ mod tests {
             bare: vec![0.5],
             range: vec![(0, 6)],
             met: vec![1, 2, 1 | ALONE, NONE, NONE, NONE],
-            places: vec![Place::default(); 6],
+            bright: vec![1.0; 6],
             ..LeafRays::default()
         };
         let (mut seen, mut whole) = (Rows::zero(1, 4), Rows::zero(1, 4));
@@ -580,5 +571,27 @@ mod tests {
         // Openness 1, 1/2 and 0; irradiance (6 + 2) / 2, (6 + 0) / 2 and 0. Of the second point no pair counts.
         let near = |row: &[f32], want: f32| row.iter().all(|x| (x - want).abs() < 1e-6);
         assert!(near(seen.row(0), 8.0 / 3.0) && near(whole.row(0), 14.0 / 6.0));
+    }
+
+    /// Two rays end at corners of a leaf of radiosity 4, one on a leaf that is even.
+    #[test]
+    fn rays_bring_the_light_of_a_tilted_leaf_at_their_places() {
+        let mut nodes = Rows::zero(3, 4);
+        nodes.row_mut(1).fill(4.0);
+        nodes.row_mut(2).fill(2.0);
+        let mut leaf_rays = LeafRays {
+            bare: vec![1.0],
+            range: vec![(0, 4)],
+            met: vec![1, 1, 2, NONE],
+            places: vec![[0, 0], [255, 0], [0, 0], [0, 0]],
+            ..LeafRays::default()
+        };
+        leaf_rays.tilt_by(Tilts(vec![[0.0; 3], [0.5, -0.25, -0.25], [0.0; 3]]));
+        let (mut seen, mut whole) = (Rows::zero(1, 4), Rows::zero(1, 4));
+        leaf_rays.irradiance::<4>(&[0], &nodes, &mut seen);
+        leaf_rays.irradiance_of_whole::<4>(&[0], &nodes, &mut whole);
+        let met: Vec<(u32, f32)> = leaf_rays.met(0).0.collect();
+        assert_eq!(met, [(1, 1.5), (1, 0.75), (2, 1.0)]);
+        assert_eq!([seen.row(0), whole.row(0)], [[11.0 / 4.0; 4]; 2]);
     }
 }

@@ -2,7 +2,6 @@
 
 use super::fluorescing::{Glow, Rounds};
 use super::flux::{self, Closed};
-use super::leaf_rays::DirectLight;
 use super::linear;
 use super::list_bounces::{ListBounces, Senders};
 use super::mixed::Mixed;
@@ -214,27 +213,21 @@ impl Bake {
     /// Finds how the light of leaves is tilted, by their direct light and what they receive besides.
     fn tilt_leaves<const L: usize>(&mut self, leaves: &[u32], first: &Rows, reflected: &Rows) {
         let lanes = &self.solution.lanes;
-        let nodes = self.refinement.tree.nodes.len();
-        let bright = |rows: &Rows| {
-            let mut bright = vec![0.0_f32; nodes];
-            for (&leaf, row) in leaves.iter().zip(rows.all::<L>()) {
-                bright[leaf as usize] = lanes.notice(row).into_iter().sum::<f64>() as f32;
-            }
-            bright
-        };
         let refinement = &mut self.refinement;
-        let direct = bright(first);
-        let with_openness = (0..nodes).zip(&direct);
-        let with_openness: Vec<f32> = with_openness
-            .map(|(k, bright)| bright * refinement.direct.with_openness(k as u32))
-            .collect();
-        let direct = DirectLight {
-            bright: &direct,
-            with_openness: &with_openness,
+        let by_leaf = |rows: &Rows| {
+            let bright = |row: &[f32; L]| lanes.notice(row).into_iter().sum::<f64>() as f32;
+            rows.all::<L>().iter().map(bright).collect::<Vec<f32>>()
         };
+        let mut bright = vec![0.0; refinement.tree.nodes.len()];
+        for (&leaf, b) in leaves.iter().zip(by_leaf(reflected)) {
+            bright[leaf as usize] = b;
+        }
+        let direct = leaves.iter().zip(by_leaf(first));
+        let direct: Vec<[f32; 2]> = direct
+            .map(|(&leaf, b)| [b, b * refinement.direct.with_openness(leaf)])
+            .collect();
         let room = (&refinement.tree, leaves, self.room.settings.seed);
-        let reflected = bright(reflected);
-        (refinement.leaf_rays).tilt(room, &reflected, &direct, &refinement.areas);
+        (refinement.leaf_rays).tilt(room, &bright, &direct, &refinement.areas);
     }
 
     /// Matrices of the paints, where lanes are not bands.

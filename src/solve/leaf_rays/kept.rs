@@ -144,7 +144,10 @@ impl LeafRays {
                 return Err(Broken::new("has rays that end nowhere"));
             }
         }
-        leaf_rays.tilts = Tilts(from.get_all()?);
+        let tilts = Tilts(from.get_all()?);
+        if !(tilts.0.is_empty() || tilts.0.len() == nodes) {
+            return Err(Broken::new("has tilts that do not fit"));
+        }
         if let Some(filters) = filters {
             leaf_rays.decode_passed(&counts, filters, from)?;
         }
@@ -162,6 +165,7 @@ impl LeafRays {
         if whole {
             leaf_rays.find(tree, 0);
         }
+        leaf_rays.tilt_by(tilts);
         Ok(leaf_rays)
     }
 

@@ -24,12 +24,6 @@ use rayon::prelude::*;
 /// least, so this holds back only those of which most rays meet no front.
 const FEWEST: f64 = 4.0;
 
-/// Direct light at leaves: brightness of the mean, and the covariance of brightness with openness.
-pub(crate) struct DirectLight<'a> {
-    pub(crate) bright: &'a [f32],
-    pub(crate) with_openness: &'a [f32],
-}
-
 /// What a leaf's rays tell.
 #[derive(Debug, Clone, Copy, Default)]
 struct Findings {
@@ -170,22 +164,22 @@ fn tilt(found: &Findings, slopes: [f64; 2]) -> [f32; 3] {
 }
 
 impl LeafRays {
-    /// Finds the tilts of leaves anew, by the brightness of what each node reflects and that of direct light.
+    /// Finds the tilts of leaves anew, by how bright what each node reflects is, and, by leaf, direct light and its covariance with
+    /// openness.
     pub(in crate::solve) fn tilt(
         &mut self,
         (tree, leaves, seed): (&Tree, &[u32], u64),
         reflected: &[f32],
-        direct: &DirectLight,
+        direct: &[[f32; 2]],
         areas: &[f64],
     ) {
-        let own = leaves.iter().filter(|&&leaf| self.team.owns(leaf as usize));
-        let own: Vec<u32> = own.copied().collect();
-        let find = |&leaf: &u32| {
-            let k = leaf as usize;
-            let direct = [direct.bright[k], direct.with_openness[k]].map(f64::from);
-            self.pairs(leaf, reflected, seed).findings(direct)
+        let own = leaves.par_iter().zip(direct);
+        let own = own.filter(|(leaf, _)| self.team.owns(**leaf as usize));
+        let find = |(&leaf, direct): (&u32, &[f32; 2])| {
+            self.pairs(leaf, reflected, seed)
+                .findings(direct.map(f64::from))
         };
-        let found: Vec<Findings> = own.par_iter().map(find).collect();
+        let found: Vec<Findings> = own.map(find).collect();
         let found = self.team.merge(leaves.iter().map(|&k| k as usize), found);
         let each = || leaves.iter().zip(&found);
         let slopes = slopes(each().map(|(&leaf, &found)| (areas[leaf as usize], found)));
@@ -194,7 +188,7 @@ impl LeafRays {
         for (&leaf, found) in each().filter(|(leaf, _)| tree.behind(**leaf) == NONE) {
             tilts[leaf as usize] = tilt(found, slopes);
         }
-        self.tilts = Tilts(tilts);
+        self.tilt_by(Tilts(tilts));
     }
 
     /// The pairs of a leaf's rays that both met fronts.
@@ -209,11 +203,8 @@ impl LeafRays {
             if fellow < k || met[0] & ALONE != 0 || met[1] & ALONE != 0 {
                 continue;
             }
-            let light = |k: usize| {
-                let leaf = met[k] & MET;
-                let tilt = self.tilts.at(leaf, self.places[both[k]]);
-                f64::from(tilt * reflected[leaf as usize])
-            };
+            let light =
+                |k: usize| f64::from(self.bright[both[k]] * reflected[(met[k] & MET) as usize]);
             // Each has the flag if the other ended close by.
             let far = [met[1], met[0]].map(|met| met & BESIDE == 0);
             pairs.add(rays.start(k), far, [light(0), light(1)]);
