@@ -49,8 +49,8 @@ impl FileKind {
     /// Raised whenever the body changes its meaning.
     fn version(self) -> u32 {
         match self {
-            Self::Checkpoint => 10,
-            Self::Cache => 11,
+            Self::Checkpoint => 11,
+            Self::Cache => 12,
         }
     }
 

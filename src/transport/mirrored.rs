@@ -267,7 +267,7 @@ impl Gatherer<'_> {
             if let Some(trace) = &mut out.trace {
                 match arrived.end {
                     PathEnd::Mirror(_) => trace.mirror(leaf, share, passage),
-                    _ => trace.hit(leaf, share, Some(passage)),
+                    _ => trace.hit(leaf, share, 1.0, Some(passage)),
                 }
             }
             if arrived.image.is_none() && self.light.bright_emitted[leaf as usize] > 0.0 {

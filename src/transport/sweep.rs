@@ -117,8 +117,7 @@ impl Gatherer<'_> {
             let tilt = memory.tilts[ray];
             add(leaf, share * tilt, ray);
             if let Some(trace) = &mut out.trace {
-                trace.hit(leaf, share, tint(ray));
-                trace.slope(leaf, share * (tilt - 1.0), tint(ray));
+                trace.hit(leaf, share, tilt, tint(ray));
             }
         }
         let how = (f64::from(share), out.backs);
@@ -264,6 +263,51 @@ mod tests {
                 assert!((sums[0] / sums[1] - 1.0).abs() < 2e-3, "{room}: {sums:?}");
             });
         }
+    }
+
+    /// Light that rises evenly across the room, leaf after leaf: rays bring that of the places where they end.
+    #[test]
+    fn rays_bring_the_light_of_where_they_end() {
+        let bake = baked("furnished.glb", 1);
+        let (tree, mesh) = (bake.tree(), bake.mesh());
+        let mut light = bake.light().clone();
+        assert!(light.tilts.0.iter().flatten().any(|&tilt| tilt > 0.0));
+        let rise = |p: DVec3| 2.0 + p.dot(DVec3::new(0.4, 0.9, -0.5)) / mesh.half_size;
+        for leaf in tree.leaves() {
+            let corners = tree.element(tree.node(leaf)).unwrap().corners.map(rise);
+            let mean = corners.iter().sum::<f64>() / 3.0;
+            light.reflected.row_mut(leaf as usize).fill(mean as f32);
+            light.tilts.0[leaf as usize] = corners.map(|b| (b / mean - 1.0) as f32);
+        }
+        bake.room.with_sight(|sight| {
+            let gatherer = Gatherer {
+                light: &light,
+                ..bake.gatherer(sight)
+            };
+            let hemisphere = gatherer.hemisphere.unwrap();
+            let share = 1.0 / hemisphere.len() as f32;
+            for leaf in tree.leaves().step_by(97) {
+                let to = middle(tree, leaf);
+                let mut memory = Memory::default();
+                memory.begin(tree.nodes.len());
+                let ends = (&mut memory.met, &mut memory.tilts, &mut Vec::new());
+                gatherer.cast(&to, hemisphere, ends, &mut Vec::new(), &mut Vec::new());
+                // What is close by is found by paths.
+                memory.tilts.truncate(memory.met.len());
+                let mut far = memory.met.iter().map(|m| !gatherer.is_near(m.0, &m.1, 0.0));
+                memory.tilts.retain(|_| far.next().unwrap());
+                memory.met.retain(|m| !gatherer.is_near(m.0, &m.1, 0.0));
+                let at = |hit: &Hit| {
+                    let face = tree.node(tree.face_node[tree.met(hit) as usize]);
+                    rise(tree.element(face).unwrap().at(weights_on_face(hit)))
+                };
+                let wanted: f64 = memory.met.iter().map(|(_, hit)| at(hit)).sum();
+                let mut out = Gathered::dark();
+                gatherer.look(&to, share, &mut memory, &mut out);
+                let off = f64::from(out.irradiance[0]) - f64::from(share) * wanted;
+                assert!(off.abs() < 1e-3, "{leaf}: {off}");
+            }
+        });
     }
 
     /// With as many paths as the light is worth, against a single turn and a great many.

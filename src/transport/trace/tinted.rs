@@ -2,8 +2,7 @@
 //! out once.
 //!
 //! A group holds: how many of the numbers for what is passed are as in the group before, how many follow, and these
-//! (see [`passed::numbers`]); then its entries, each `8 id + kind` and, except for rays, the weight. A ray takes about
-//! 8 bytes.
+//! (see [`passed::numbers`]); then its entries, each `8 id + kind` and the weight. A ray takes about 12 bytes.
 
 use super::bytes::{TraceReader, broken, number};
 use crate::light::passed::{self, Passed};
@@ -42,11 +41,6 @@ impl EntryKind {
         Self::Emitted,
         Self::Lamp,
     ];
-
-    /// Do all entries of this kind have the same weight?
-    fn is_ray(self) -> bool {
-        matches!(self, Self::Hit | Self::Mirror)
-    }
 }
 
 /// One source of light.
@@ -92,7 +86,7 @@ impl TintedEntries {
         // Stable, so that sums do not depend on the sort.
         self.entries.sort_by_cached_key(key);
         self.entries.dedup_by(|next, kept| {
-            let same = key(next) == key(kept) && !kept.1.kind.is_ray();
+            let same = key(next) == key(kept);
             if same {
                 kept.1.weight += next.1.weight;
             }
@@ -110,9 +104,7 @@ impl TintedEntries {
             number(group.len() as u64, out);
             for (_, entry) in group {
                 number(u64::from(entry.id) << 3 | entry.kind as u64, out);
-                if !entry.kind.is_ray() {
-                    out.extend(entry.weight.to_le_bytes());
-                }
+                out.extend(entry.weight.to_le_bytes());
             }
             before = own;
         }
@@ -187,10 +179,7 @@ fn entry(from: &mut TraceReader) -> Read<Entry> {
     let word = from.number()?;
     let id = u32::try_from(word >> 3).map_err(|_| broken())?;
     let kind = *EntryKind::ALL.get((word & 7) as usize).ok_or_else(broken)?;
-    let weight = match kind.is_ray() {
-        true => 1.0,
-        false => from.float()?,
-    };
+    let weight = from.float()?;
     Ok(Entry { kind, id, weight })
 }
 
