@@ -318,14 +318,15 @@ fn the_report_measures_what_finer_rounds_improve() {
         },
     );
     bake.step();
-    let first = Report::new(&bake, 60, 4096, 9);
+    let reference = PathReference::new(&bake, 60, 4096, 9);
+    let first = Report::against(&bake, &reference);
     assert_eq!(first.honesty, Honesty::NoEstimate);
     assert_eq!(first.estimate_de2000, None);
     assert!(first.points + first.covered == 60 && first.covered < 10);
-    for _ in 0..3 {
+    for _ in 0..2 {
         bake.step();
     }
-    let last = Report::new(&bake, 60, 4096, 9);
+    let last = Report::against(&bake, &reference);
     println!("{:?} then {:?}", first.de2000, last.de2000);
     assert!(last.de2000.mean.value < first.de2000.mean.value);
     for summary in [last.de2000, last.relative] {

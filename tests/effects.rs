@@ -1,7 +1,7 @@
 //! Only the effects that a scene calls for are paid for: shown by counters, never by time.
 
 use crate::common::built;
-use crate::common::every_effect;
+use crate::common::every_effect::{self, EFFECTS};
 
 use built::{Room, sun};
 use glam::{DVec3, dvec3};
@@ -302,15 +302,7 @@ fn effects_that_are_not_there_cost_nothing() {
 fn paths_agree_with_all_effects_at_once() {
     let bake = baked(every_effect::room(), Representation::Adaptive);
     let plan = bake.plan();
-    for kind in [
-        EffectKind::MeasuredLamps,
-        EffectKind::Sky,
-        EffectKind::Sun,
-        EffectKind::Panes,
-        EffectKind::Sheets,
-        EffectKind::Mirrors,
-        EffectKind::Fluorescence,
-    ] {
+    for kind in EFFECTS {
         assert!(plan.runs(kind), "{plan}");
     }
     // A few bright paths make some references uncertain: each counts by how narrow its interval is.

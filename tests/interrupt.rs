@@ -1,31 +1,32 @@
 //! A round that is given up leaves the bake as it was, wherever it is given up, and asking changes nothing.
 
+use crate::common::every_effect::small;
+
 use haarlight::output::{Exposure, Writing, baked_glb};
+use haarlight::scene::effects::EffectKind;
 use haarlight::scene::{Options, Scene};
 use haarlight::solve::{Bake, Settings};
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// Rounds before the one that is given up.
-const BEFORE: usize = 2;
-
-fn room(name: &str) -> (Scene, Settings) {
+fn room(name: &str) -> Scene {
     let path = Path::new(env!("CARGO_MANIFEST_DIR"))
         .join("scenes")
         .join(name);
-    let scene = Scene::load(path, &Options::default()).unwrap();
-    // Coarse: what is asked for has no part in what is left.
-    let settings = Settings {
-        error: 4.0,
-        ..Settings::default()
-    };
-    (scene, settings)
+    Scene::load(path, &Options::default()).unwrap()
 }
 
-fn bake(name: &str) -> Bake {
-    let (scene, settings) = room(name);
-    Bake::new(scene, settings)
+/// Coarse: what is asked for has no part in what is left.
+fn settings() -> Settings {
+    Settings {
+        error: 4.0,
+        ..Settings::default()
+    }
+}
+
+fn bake(scene: &Scene) -> Bake {
+    Bake::new(scene.clone(), settings())
 }
 
 /// The records without their times, the light of every patch to the last bit, and what the hierarchy has become.
@@ -68,19 +69,24 @@ fn step(bake: &mut Bake, after: usize) -> (bool, usize) {
     (done.is_some(), asked.load(Ordering::Relaxed))
 }
 
-/// Wherever a round is given up, what is left is the bake of one round fewer, to the last bit; and it can go on from there.
-fn given_up(name: &str, least: usize) {
-    let mut whole = bake(name);
-    for _ in 0..BEFORE {
+/// Wherever the round after `before` others is given up, what is left is the bake of one round fewer, to the last bit; and it can go on
+/// from there.
+fn given_up(name: &str, scene: &Scene, before: usize, least: usize) {
+    let mut whole = bake(scene);
+    for _ in 0..before {
         whole.step();
     }
-    let (before, written) = (state(&whole), file(&whole));
+    let (left, written) = (state(&whole), file(&whole));
     // This one is asked, and the one that goes on below is not.
     let (done, times) = step(&mut whole, usize::MAX);
     assert!(done && times >= least, "{name}: asked {times} times only");
+    println!(
+        "{name}: asked {times} times, {} patches",
+        whole.tree().nodes.len()
+    );
     let after = state(&whole);
 
-    let mut other = bake(name);
+    let mut other = bake(scene);
     other.keep();
     // Of a first round that is given up nothing is left but the light that rays from the lamps and to the sky tell.
     assert!(!step(&mut other, 0).0 && other.rounds().is_empty());
@@ -89,17 +95,17 @@ fn given_up(name: &str, least: usize) {
     assert!(file(&other).len() > 1000, "{name}: no file");
     assert!(!other.keeps());
     assert!(step(&mut other, usize::MAX).0);
-    for _ in 1..BEFORE {
+    for _ in 1..before {
         assert!(step(&mut other, usize::MAX).0);
     }
-    assert!(state(&other) == before, "{name}: asking changes a round");
+    assert!(state(&other) == left, "{name}: asking changes a round");
     for after in [0, 1, times / 4, times / 2, 3 * times / 4, times - 1] {
         assert!(
             !step(&mut other, after).0,
             "{name}: not after {after} of {times}"
         );
         assert!(other.taken_back_s().is_some_and(|s| s >= 0.0));
-        assert!(state(&other) == before, "{name}: after {after} of {times}");
+        assert!(state(&other) == left, "{name}: after {after} of {times}");
     }
     assert!(file(&other) == written, "{name}: another file");
     other.step();
@@ -109,41 +115,35 @@ fn given_up(name: &str, least: usize) {
 
 #[test]
 fn by_links() {
-    given_up("cornell-f2.glb", 100);
+    given_up("cornell-f2", &room("cornell-f2.glb"), 2, 100);
 }
 
 #[test]
 fn by_rays() {
-    given_up("furnished.glb", 300);
+    given_up("furnished", &room("furnished.glb"), 2, 300);
 }
 
+/// Each effect by itself.
 #[test]
-fn through_panes() {
-    given_up("glazed.glb", 100);
-}
-
-#[test]
-fn by_mirrors() {
-    given_up("mirrored.glb", 100);
-}
-
-#[test]
-fn through_sheets() {
-    given_up("curtained.glb", 100);
-}
-
-#[test]
-fn where_paints_fluoresce() {
-    given_up("brightened.glb", 100);
+fn whatever_the_effects() {
+    use EffectKind::{Fluorescence, Mirrors, Panes, Sheets};
+    let each = [
+        ("panes", &[Panes][..]),
+        ("mirrors", &[Mirrors]),
+        ("sheets", &[Sheets]),
+        ("fluorescence", &[Fluorescence]),
+    ];
+    for (name, kinds) in each {
+        given_up(name, &small(kinds), 1, 30);
+    }
 }
 
 /// Prepares a room until it was asked `after` times; and how often was it asked?
-fn prepared(name: &str, after: usize) -> (Option<Bake>, usize) {
-    let (scene, settings) = room(name);
+fn prepared(scene: &Scene, after: usize) -> (Option<Bake>, usize) {
     let asked = Arc::new(AtomicUsize::new(0));
     let count = asked.clone();
     let stop = move || count.fetch_add(1, Ordering::Relaxed) >= after;
-    let bake = Bake::new_unless(scene, settings, Arc::new(stop));
+    let bake = Bake::new_unless(scene.clone(), settings(), Arc::new(stop));
     (bake, asked.load(Ordering::Relaxed))
 }
 
@@ -151,14 +151,17 @@ fn prepared(name: &str, after: usize) -> (Option<Bake>, usize) {
 /// Asking changes nothing.
 #[test]
 fn preparing() {
-    for (name, least) in [("furnished.glb", 12), ("glazed.glb", 1000)] {
-        let (whole, times) = prepared(name, usize::MAX);
+    for (name, scene, least) in [
+        ("furnished", room("furnished.glb"), 12),
+        ("panes", small(&[EffectKind::Sky, EffectKind::Panes]), 1000),
+    ] {
+        let (whole, times) = prepared(&scene, usize::MAX);
         assert!(times >= least, "{name}: asked {times} times only");
         for after in (0..8).chain([times / 4, times / 2, times - 1]) {
-            let (bake, _) = prepared(name, after);
+            let (bake, _) = prepared(&scene, after);
             assert!(bake.is_none(), "{name}: not after {after} of {times}");
         }
-        let (mut whole, mut plain) = (whole.unwrap(), bake(name));
+        let (mut whole, mut plain) = (whole.unwrap(), bake(&scene));
         assert!(step(&mut whole, usize::MAX).0);
         plain.step();
         assert!(state(&whole) == state(&plain), "{name}: asking changes it");

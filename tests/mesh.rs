@@ -68,6 +68,7 @@ fn a_mesh_that_is_cut_short_is_whole_and_measured() {
         "asking changes the mesh"
     );
     assert!(times > 10, "{times}");
+    let reference = PathReference::new(&bake, 300, 4096, 7);
     for after in [0, times / 6, times / 3] {
         let (baked, _) = cut(after);
         has_no_cracks(&bake, &baked);
@@ -75,7 +76,7 @@ fn a_mesh_that_is_cut_short_is_whole_and_measured() {
         assert!(found.points > 300, "{after}: {found:?}");
         assert!(after > 0 || !found.is_met(), "{found:?}");
         let stated = bake.error_of(&baked).unwrap();
-        let measured = Report::of_file(&bake, &baked, &PathReference::new(&bake, 300, 4096, 7));
+        let measured = Report::of_file(&bake, &baked, &reference);
         let mean = measured.de2000.mean.value;
         assert!(
             (0.6..1.7).contains(&(stated / mean)),

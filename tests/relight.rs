@@ -1,10 +1,13 @@
 //! Relighting: the same as a fresh bake within the errors that both state, without a ray; other shapes are refused.
 
+use crate::common::every_effect::small;
+
 use glam::DVec3;
 use haarlight::color::de2000;
 use haarlight::gather::{Baked, BakedVertex, MOSTLY};
 use haarlight::geometry::{NO_PLANE, Segment};
 use haarlight::keep::{Relighter, Relit};
+use haarlight::scene::effects::EffectKind;
 use haarlight::scene::pane::PaneKind;
 use haarlight::scene::{Options, Scene};
 use haarlight::solve::{Bake, Representation, Settings};
@@ -74,11 +77,11 @@ fn opened(cache: &[u8], scene: Scene) -> haarlight::Result<Relighter> {
 static CORNELL: LazyLock<Cached> =
     LazyLock::new(|| Cached::new(room("cornell.glb"), settings(1.0, 9)));
 static FURNISHED: LazyLock<Cached> =
-    LazyLock::new(|| Cached::new(room("furnished.glb"), settings(1.5, 3)));
+    LazyLock::new(|| Cached::new(room("furnished.glb"), settings(3.0, 3)));
 static GLAZED: LazyLock<Cached> =
-    LazyLock::new(|| Cached::new(room("glazed.glb"), settings(2.0, 4)));
+    LazyLock::new(|| Cached::new(room("glazed.glb"), settings(4.0, 2)));
 static MIRRORED: LazyLock<Cached> =
-    LazyLock::new(|| Cached::new(room("mirrored.glb"), settings(2.0, 4)));
+    LazyLock::new(|| Cached::new(room("mirrored.glb"), settings(4.0, 2)));
 
 /// Tristimulus irradiance of all vertices.
 fn irradiance(baked: &Baked) -> Vec<[f64; 3]> {
@@ -155,17 +158,13 @@ fn estimate(bake: &Bake) -> f64 {
 /// Nothing changed: the bake to rounding, on the same mesh. There is no ray index, so a ray would see everything.
 #[test]
 fn without_a_change_the_bake_comes_out() {
-    let [closed, two, furnished] = [
-        ("cornell-closed.glb", settings(2.0, 9)),
-        ("two-rooms.glb", settings(2.0, 9)),
-        ("furnished.glb", settings(3.0, 2)),
-    ]
-    .map(|(name, settings)| Cached::new(room(name), settings));
+    let [closed, two] = ["cornell-closed.glb", "two-rooms.glb"]
+        .map(|name| Cached::new(room(name), settings(2.0, 9)));
     for (name, cached) in [
         ("cornell.glb", &*CORNELL),
         ("cornell-closed.glb", &closed),
         ("two-rooms.glb", &two),
-        ("furnished.glb", &furnished),
+        ("furnished.glb", &*FURNISHED),
         ("glazed.glb", &GLAZED),
         ("mirrored.glb", &MIRRORED),
     ] {
@@ -281,7 +280,7 @@ fn lamps_go_out_in_a_furnished_room() {
     };
     let cached = &FURNISHED;
     let (_, relit) = cached.relit(changed());
-    let mut fresh = Bake::new(changed(), settings(1.5, 3));
+    let mut fresh = Bake::new(changed(), settings(3.0, 3));
     fresh.run();
     let stated = relit.record.error_de2000.value.unwrap();
     let measured = difference(&fresh, &relit.baked, 1);
@@ -325,7 +324,7 @@ fn panes_and_mirrors_leave_what_they_leave_in_a_fresh_bake() {
         };
         let (_, relit) = cached.relit(changed());
         assert!(relit.record.changed);
-        let mut fresh = Bake::new(changed(), settings(2.0, 4));
+        let mut fresh = Bake::new(changed(), settings(4.0, 2));
         fresh.run();
         let stated = relit.record.error_de2000.value.unwrap();
         let measured = difference(&fresh, &relit.baked, 1);
@@ -349,31 +348,31 @@ fn panes_and_mirrors_leave_what_they_leave_in_a_fresh_bake() {
 /// Another pane, or a mirror that is none any more, is another shape: where light goes is in the cache.
 #[test]
 fn moved_panes_and_dull_mirrors_are_refused() {
-    let refused = |name: &str, change: &dyn Fn(&mut Scene)| {
-        let (_, cache) = SMALL.iter().find(|(of, _)| *of == name).unwrap();
-        let mut other = room(name);
+    let refused = |which: usize, change: &dyn Fn(&mut Scene)| {
+        let (mut other, cache) = SMALL[which].clone();
         change(&mut other);
-        let error = opened(cache, other).err().unwrap();
+        let error = opened(&cache, other).err().unwrap();
         assert_eq!(error.exit_code(), 2);
         error.to_string()
     };
-    let text = refused("glazed.glb", &|scene| scene.panes[0].positions[0].x += 0.01);
+    let text = refused(1, &|scene| scene.panes[0].positions[0].x += 0.01);
     assert!(text.contains("another shape: pane"), "{text}");
-    let text = refused("mirrored.glb", &|scene| {
+    let text = refused(2, &|scene| {
         scene.materials.iter_mut().for_each(|m| m.mirror = None);
     });
     assert!(text.contains("another shape: surface"), "{text}");
 }
 
-/// Relit from a cache, a room with panes or mirrors does not depend on the number of threads.
+/// Relit from a cache, a room does not depend on the number of threads.
 #[test]
 fn caches_are_the_same_on_any_number_of_threads() {
-    for name in ["glazed.glb", "mirrored.glb"] {
+    use EffectKind::{Mirrors, Panes};
+    for (name, scene) in [("panes", small(&[Panes])), ("mirrors", small(&[Mirrors]))] {
         let on = |threads: usize| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
             pool.build().unwrap().install(|| {
-                let cached = Cached::new(room(name), settings(6.0, 1));
-                let mut dimmed = room(name);
+                let cached = Cached::new(scene.clone(), settings(6.0, 1));
+                let mut dimmed = scene.clone();
                 dimmed.spectra[0].power.iter_mut().for_each(|x| *x *= 0.5);
                 let (_, relit) = cached.relit(dimmed);
                 irradiance(&relit.baked)
@@ -501,12 +500,13 @@ fn a_resumed_bake_writes_the_same_cache() {
 }
 
 /// Rooms and their caches: one of few triangles, and such with panes and mirrors.
-static SMALL: LazyLock<[(&str, Vec<u8>); 3]> = LazyLock::new(|| {
-    let of = |name: &'static str, settings| (name, Cached::new(room(name), settings).cache);
+static SMALL: LazyLock<[(Scene, Vec<u8>); 3]> = LazyLock::new(|| {
+    use EffectKind::{Mirrors, Panes};
+    let of = |scene: Scene| (scene.clone(), Cached::new(scene, settings(9.0, 1)).cache);
     [
-        of("two-rooms.glb", settings(5.0, 2)),
-        of("glazed.glb", settings(9.0, 1)),
-        of("mirrored.glb", settings(9.0, 1)),
+        of(room("two-rooms.glb")),
+        of(small(&[Panes])),
+        of(small(&[Mirrors])),
     ]
 });
 
@@ -521,8 +521,7 @@ proptest! {
         early in any::<bool>(),
         which in prop::sample::select(vec![0, 0, 1, 2]),
     ) {
-        let (name, bytes) = &SMALL[which];
-        let mut bytes = bytes.clone();
+        let (scene, mut bytes) = SMALL[which].clone();
         bytes.truncate(bytes.len() - 8);
         for (at, with, count) in changes {
             let at = at.index(if early { 4096 } else { bytes.len() });
@@ -539,7 +538,7 @@ proptest! {
         let sum = container::checksum(&bytes);
         bytes.truncate(bytes.len() - 8);
         bytes.extend(sum.to_le_bytes());
-        let done = opened(&bytes, room(name)).and_then(|mut r| r.relight());
+        let done = opened(&bytes, scene).and_then(|mut r| r.relight());
         if let Err(error) = done {
             prop_assert_eq!(error.exit_code(), 2);
         }
@@ -644,7 +643,7 @@ fn lamps_get_spectra_of_their_own_and_share_one_again() {
     };
     let lights = |scene: &Scene| scene.spectra.len();
     assert!(lights(&tinted()) > lights(&read("{}")));
-    let cached = Cached::new(read("{}"), settings(3.0, 3));
+    let cached = Cached::new(read("{}"), settings(3.0, 2));
     let mean = |baked: &Baked| -> f64 {
         let all = irradiance(baked);
         all.iter().map(|xyz| xyz[1]).sum::<f64>() / all.len() as f64
@@ -653,7 +652,7 @@ fn lamps_get_spectra_of_their_own_and_share_one_again() {
     let (mut relighter, _) = cached.relit(read("{}"));
     relighter.change(tinted()).unwrap();
     let more = relighter.relight().unwrap();
-    let mut fresh = Bake::new(tinted(), settings(3.0, 3));
+    let mut fresh = Bake::new(tinted(), settings(3.0, 2));
     fresh.run();
     let stated = more.record.error_de2000.value.unwrap();
     let measured = difference(&fresh, &more.baked, 1);

@@ -160,7 +160,7 @@ fn a_map_lights_the_walls_that_look_at_its_colours() {
 #[test]
 fn one_bright_texel_is_a_sun() {
     let folder = TempDir::new().unwrap();
-    for (width, cuts) in [(256, 1), (256, 20), (1024, 1), (1024, 20)] {
+    for (width, cuts) in [(256, 1), (256, 12), (1024, 1), (1024, 12)] {
         let row = 35 * width / 256;
         let bright = toward(width, 2 * width / 256, row);
         let light = |d: DVec3| [if d.dot(bright) > 1.0 - 1e-9 { 1e6 } else { 1.0 }; 3];

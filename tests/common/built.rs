@@ -163,17 +163,7 @@ impl Room {
     /// A pane of an index and of what its inside lets through, band by band; returns its index.
     pub(crate) fn pane(&mut self, ior: f64, inside: Spectrum) -> usize {
         let material = self.paint(0.0);
-        self.materials[material].pane = Some(Pane {
-            kind: PaneKind::Glass {
-                ior,
-                inside,
-                unit: None,
-                thickness: 1.0,
-                share: 1.0,
-            },
-            texture: None,
-            from: "given".into(),
-        });
+        self.materials[material].pane = Some(glass(ior, inside));
         material
     }
 
@@ -182,14 +172,8 @@ impl Room {
         let material = self.spectral_paint(front);
         self.materials[material].sides = Sides::Both;
         self.materials[material].sheet = Some(Sheet {
-            transmittance: through,
             back: Some(back),
-            strength: 0.0,
-            strength_texture: None,
-            color: None,
-            color_texture: None,
-            shares: false,
-            from: "given".into(),
+            ..paper(through)
         });
         material
     }
@@ -357,6 +341,35 @@ impl Room {
             warnings: Vec::new(),
             changes: Default::default(),
         }
+    }
+}
+
+/// Glass of an index and of what its inside lets through, band by band.
+pub(crate) fn glass(ior: f64, inside: Spectrum) -> Pane {
+    Pane {
+        kind: PaneKind::Glass {
+            ior,
+            inside,
+            unit: None,
+            thickness: 1.0,
+            share: 1.0,
+        },
+        texture: None,
+        from: "given".into(),
+    }
+}
+
+/// A diffuse sheet by what it lets through, that reflects as much on both sides.
+pub(crate) fn paper(through: Spectrum) -> Sheet {
+    Sheet {
+        transmittance: through,
+        back: None,
+        strength: 0.0,
+        strength_texture: None,
+        color: None,
+        color_texture: None,
+        shares: false,
+        from: "given".into(),
     }
 }
 

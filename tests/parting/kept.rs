@@ -1,10 +1,12 @@
 //! Layers in files for NumPy and in caches.
 
 use super::{haarlight, layers, loaded, parted, scenes, sums_up, two_lamps};
+use crate::common::every_effect::small;
 use haarlight::gather::{Baked, BakedSurface};
 use haarlight::keep::Relighter;
 use haarlight::output::npz;
 use haarlight::scene::Scene;
+use haarlight::scene::effects::EffectKind;
 use haarlight::solve::{Bake, Settings};
 use std::path::Path;
 
@@ -12,8 +14,14 @@ use std::path::Path;
 #[test]
 fn spectra_of_layers_add_up() {
     // What fluoresces gives out light of every layer.
-    for name in ["furnished.glb", "brightened.glb"] {
-        let mut bake = parted(loaded(name, None), 4.0);
+    for (name, scene) in [
+        ("furnished", loaded("furnished.glb", None)),
+        (
+            "fluorescent",
+            small(&[EffectKind::Sky, EffectKind::Fluorescence]),
+        ),
+    ] {
+        let mut bake = parted(scene, 4.0);
         while bake.rounds().is_empty() {
             bake.step();
         }

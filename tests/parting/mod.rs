@@ -5,6 +5,7 @@ mod kept;
 mod pages;
 
 use crate::common::built;
+use crate::common::every_effect::{EFFECTS, small};
 
 use built::Room;
 use glam::{DVec3, dvec3};
@@ -135,13 +136,16 @@ fn layers_at_vertices_add_up_in_all_kinds_of_rooms() {
         ("gallery.glb", 3),
         ("two-rooms.glb", 2),
         ("daylit.glb", 2),
-        ("glazed.glb", 2),
     ] {
         let bake = parted(loaded(name, None), 4.0);
         assert_eq!(layers(&bake).names.len(), count, "{name}");
         assert!(bake.lanes().len() <= BANDS);
         sums_up(&bake, &bake.baked(&|_, _| {}), name);
     }
+    // Lamp, sky and sun.
+    let bake = parted(small(&EFFECTS), 4.0);
+    assert_eq!(layers(&bake).names.len(), 3);
+    sums_up(&bake, &bake.baked(&|_, _| {}), "all effects");
 }
 
 /// The mean error that a bake states.
