@@ -134,7 +134,7 @@ fn whatever_the_effects() {
         ("fluorescence", &[Fluorescence]),
     ];
     for (name, kinds) in each {
-        given_up(name, &small(kinds), 1, 30);
+        given_up(name, &small(kinds), 1, 100);
     }
 }
 

@@ -502,11 +502,11 @@ fn a_resumed_bake_writes_the_same_cache() {
 /// Rooms and their caches: one of few triangles, and such with panes and mirrors.
 static SMALL: LazyLock<[(Scene, Vec<u8>); 3]> = LazyLock::new(|| {
     use EffectKind::{Mirrors, Panes};
-    let of = |scene: Scene| (scene.clone(), Cached::new(scene, settings(9.0, 1)).cache);
+    let of = |scene: Scene, settings| (scene.clone(), Cached::new(scene, settings).cache);
     [
-        of(room("two-rooms.glb")),
-        of(small(&[Panes])),
-        of(small(&[Mirrors])),
+        of(room("two-rooms.glb"), settings(5.0, 2)),
+        of(small(&[Panes]), settings(9.0, 1)),
+        of(small(&[Mirrors]), settings(9.0, 1)),
     ]
 });
 

@@ -73,7 +73,7 @@ pub struct Memory {
     pub(super) shadows: Shadows,
     /// What the rays of a point met.
     pub(super) met: Vec<(u32, Hit)>,
-    /// How much brighter their leaves are there than in the mean.
+    /// How bright their leaves are there, as a share of their mean.
     pub(super) tilts: Vec<f32>,
     /// What panes leave of the light of these hits, in order; empty in a room without panes.
     pub(super) tints: Vec<Option<Box<Passage>>>,

@@ -293,10 +293,10 @@ mod tests {
                 let ends = (&mut memory.met, &mut memory.tilts, &mut Vec::new());
                 gatherer.cast(&to, hemisphere, ends, &mut Vec::new(), &mut Vec::new());
                 // What is close by is found by paths.
-                memory.tilts.truncate(memory.met.len());
-                let mut far = memory.met.iter().map(|m| !gatherer.is_near(m.0, &m.1, 0.0));
-                memory.tilts.retain(|_| far.next().unwrap());
-                memory.met.retain(|m| !gatherer.is_near(m.0, &m.1, 0.0));
+                let met = std::mem::take(&mut memory.met).into_iter();
+                let tilted = met.zip(std::mem::take(&mut memory.tilts));
+                let far = tilted.filter(|((leaf, hit), _)| !gatherer.is_near(*leaf, hit, 0.0));
+                (memory.met, memory.tilts) = far.unzip();
                 let at = |hit: &Hit| {
                     let face = tree.node(tree.face_node[tree.met(hit) as usize]);
                     rise(tree.element(face).unwrap().at(weights_on_face(hit)))
