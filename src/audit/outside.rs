@@ -55,7 +55,12 @@ impl Audit<'_> {
     pub(super) fn openings_from(&self, at: &PathVertex) -> Option<OpeningDistribution> {
         let (sky, openings) = (self.scene.sky.as_ref()?, self.openings.as_ref()?);
         let mut choice = OpeningDistribution::default();
-        openings.weigh(PATHS, (at.point, at.normal), |d| sky.plain(d), &mut choice);
+        openings.weigh(
+            PATHS,
+            (at.point, at.normal),
+            |d| sky.look(d).plain,
+            &mut choice,
+        );
         Some(choice)
     }
 
@@ -72,7 +77,7 @@ impl Audit<'_> {
             (Some(openings), Some(choice)) => openings.density(choice, at.point, direction),
             _ => 0.0,
         };
-        cosine / PI + sky.spot_density(direction) + through
+        cosine / PI + sky.look(direction).density + through
     }
 
     /// What a path that leaves the room brings from there, in a direction chosen by the cosine, or turned by so many mirrors: these are

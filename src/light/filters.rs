@@ -14,6 +14,7 @@ use crate::scene::pane::{Pane, PaneKind, Slab};
 use crate::spectrum::BANDS;
 use fearless_simd::{Level, dispatch, f32x8, prelude::*};
 use glam::Vec3;
+use std::collections::BTreeMap;
 
 /// Transmittance or reflectance by lane.
 pub type Filter = [f32; BANDS];
@@ -224,7 +225,7 @@ impl Passage {
 pub(crate) struct Tint {
     sum: [f64; BANDS],
     all: f64,
-    by: Vec<(Passed, f64)>,
+    by: BTreeMap<Passed, f64>,
     /// Weight of ways on which nothing is lost.
     free: f64,
 }
@@ -234,7 +235,7 @@ impl Default for Tint {
         Self {
             sum: [0.0; BANDS],
             all: 0.0,
-            by: Vec::new(),
+            by: BTreeMap::new(),
             free: 0.0,
         }
     }
@@ -252,8 +253,14 @@ impl Tint {
         for (sum, x) in self.sum.iter_mut().zip(filter) {
             *sum += weight * f64::from(*x);
         }
-        let times = |(passed, share): &(Passed, f32)| (passed.clone(), weight * f64::from(*share));
-        self.by.extend(by.iter().map(times));
+        for (passed, share) in by {
+            let weight = weight * f64::from(*share);
+            // Most rays pass what others passed, too.
+            match self.by.get_mut(passed) {
+                Some(sum) => *sum += weight,
+                None => _ = self.by.insert(passed.clone(), weight),
+            }
+        }
     }
 
     /// The mean; none without ways.

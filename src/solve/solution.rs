@@ -17,6 +17,8 @@ const GATHER_SHARE: f64 = 0.1;
 pub(super) const NOISE_AT_POINT: AllowedNoise = AllowedNoise {
     lamps: 1.0,
     most_rays: 1024,
+    // With as few as a tolerance in lightness asks for, points to which a hole of .1 m sends all their light are 9 % off.
+    opening_rays: [4096, 4096],
     nearby: 2.0,
     most_turns: 32.0,
 };
@@ -25,6 +27,7 @@ pub(super) const NOISE_AT_POINT: AllowedNoise = AllowedNoise {
 const NOISE_IN_SOLVE: AllowedNoise = AllowedNoise {
     lamps: 4.0,
     most_rays: 256,
+    opening_rays: [256, 4096],
     nearby: 4.0,
     most_turns: 16.0,
 };

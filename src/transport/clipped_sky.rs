@@ -336,7 +336,7 @@ struct Part {
 #[cfg(test)]
 mod tests {
     use super::super::gatherer::Memory;
-    use super::super::surroundings::SkySampling;
+    use super::super::surroundings::{OpeningRays, SkySampling};
     use super::*;
     use crate::transport::tests::{baked, middle};
 
@@ -369,9 +369,16 @@ mod tests {
                 let to = middle(tree, leaf);
                 let ways = (sight, Some(&gatherer as &dyn Obstacles));
                 let area = tree.node(leaf).area;
-                let seen = outside.seen(ways, &to, SkySampling::Rays(2), &mut look);
+                let sampling = SkySampling::Rays(2);
+                let openings = OpeningRays {
+                    range: sampling.opening_rays([0; 2]),
+                    enough: &|_| 0,
+                    weighed_at: to.point,
+                };
+                let many = (sampling, openings);
+                let seen = outside.seen(ways, &to, many, &mut look);
                 add(&mut clipped, area, seen, &look.tints);
-                let seen = outside.by_rays(ways, &to, SkySampling::Rays(2), &mut look);
+                let seen = outside.by_rays(ways, &to, many, &mut look);
                 add(&mut cast, area, seen, &look.tints);
             }
         });

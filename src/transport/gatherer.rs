@@ -49,6 +49,8 @@ pub(crate) struct AllowedNoise {
     pub(crate) lamps: f64,
     /// Rays to all lamps, or all bright patches, together.
     pub(crate) most_rays: usize,
+    /// Rays to the openings to a sky, at the least and at the most.
+    pub(crate) opening_rays: [usize; 2],
     /// What is met close by, see `transport::nearby`.
     pub(crate) nearby: f64,
     /// Turns of paths from there.
@@ -165,9 +167,14 @@ impl Gatherer<'_> {
 
     /// What panes and mirrors leave of light on a free segment; none: all.
     pub(super) fn through(&self, segment: &Segment) -> Option<Passage> {
+        self.passage(segment, self.steps())
+    }
+
+    /// The same, recorded by these steps if any.
+    pub(super) fn passage(&self, segment: &Segment, steps: Option<Steps>) -> Option<Passage> {
         match self.via {
-            Some(via) => self.by_way_of(via, segment),
-            None => (self.glass?).through(segment.from, segment.to, self.steps()),
+            Some(via) => self.by_way_of(via, segment, steps),
+            None => (self.glass?).through(segment.from, segment.to, steps),
         }
     }
 

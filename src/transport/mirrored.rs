@@ -10,6 +10,7 @@ use super::via::{Arrived, PathEnd, Via};
 use crate::geometry::sampling::{cosine_direction, hash, sequence02};
 use crate::geometry::{Hit, Segment};
 use crate::hierarchy::Route;
+use crate::light::passed::Steps;
 use crate::light::{Passage, accumulate};
 use crate::link::Visibility;
 use glam::{DVec3, Vec3};
@@ -50,16 +51,21 @@ impl Gatherer<'_> {
     }
 
     /// What is left of light on a segment by way of mirrors.
-    pub(super) fn by_way_of(&self, via: Via, segment: &Segment) -> Option<Passage> {
+    pub(super) fn by_way_of(
+        &self,
+        via: Via,
+        segment: &Segment,
+        steps: Option<Steps>,
+    ) -> Option<Passage> {
         let mirrors = self.sight.mirrors?;
         let route = mirrors.route(via.image, via.point, segment.to.as_dvec3())?;
-        Some(self.along(&route))
+        Some(self.along(&route, steps))
     }
 
     /// What mirrors on a route and panes between them leave of light.
-    pub(super) fn along(&self, route: &Route) -> Passage {
+    pub(super) fn along(&self, route: &Route, steps: Option<Steps>) -> Passage {
         let glazing = self.glass.map(|glass| glass.glazing);
-        self.filters.along(glazing, route, self.steps())
+        self.filters.along(glazing, route, steps)
     }
 
     /// Distance beyond which everything lies outside the room, straight or by way of mirrors.
@@ -162,7 +168,7 @@ impl Gatherer<'_> {
                 let own = |a: &&Arrived| a.image == Some(image);
                 let open = mirrored.iter().filter(own).filter_map(Arrived::outside);
                 let open: Vec<DVec3> = open.collect();
-                gatherer.outside_in_mirrors(from, (&open, of), seen.len(), memory, out);
+                gatherer.outside_in_mirrors(from, (&open, of), memory, out);
             }
         });
         let share = 1.0 / of.max(1) as f64;
@@ -213,7 +219,7 @@ impl Gatherer<'_> {
             mirrored.push(Arrived {
                 end,
                 image: way.image,
-                passage: Box::new(self.along(&way.route)),
+                passage: Box::new(self.along(&way.route, self.steps())),
             });
         }
         true
@@ -243,7 +249,7 @@ impl Gatherer<'_> {
                 memory.mirrored.push(Arrived {
                     end: PathEnd::Outside(way.direction),
                     image: way.image,
-                    passage: Box::new(self.along(&way.route)),
+                    passage: Box::new(self.along(&way.route, self.steps())),
                 });
             }
         }

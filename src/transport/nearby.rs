@@ -156,7 +156,7 @@ impl Gatherer<'_> {
             memory.rays += 1;
             let mirrored = next.and_then(|hit| self.sight.mirrored(start, ahead, &hit));
             if let Some(mirrored) = &mirrored {
-                path.through *= self.left_by(Some(&self.along(&mirrored.route)));
+                path.through *= self.left_by(Some(&self.along(&mirrored.route, self.steps())));
                 next = mirrored.hit;
             }
             let found = next.and_then(|hit| Some((self.met_at(&hit)?, hit)));

@@ -20,13 +20,15 @@ use glam::{DVec3, Vec3};
 use std::f64::consts::PI;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// Rays over the hemisphere, to the openings, and towards spots if any: from a random point of a leaf, from a point of a quadrature rule,
-/// from a point for its own sake, and from one whose rays over the hemisphere are known. With 1024 rays to the openings for a point's own sake,
-/// points are off by up to 1.1 % below a clear sky (CIE 171 5.9, twelve trials; .20 in root mean square) and by up to 1.2 % beside a wall of glass
-/// (four; .39), with 2048 by .46 (.10) and .60 (.17), in the same time (all with scrambled points).
-const RAYS: [[usize; 3]; 4] = [[16, 16, 16], [64, 64, 64], [512, 2048, 1024], [0, 256, 256]];
-/// Factor of the rays to the openings in rooms of few triangles. With 4, a sky in a periscope is off by more than 1 %.
-const FEW: usize = 16;
+/// Rays over the hemisphere, and towards spots if any: from a random point of a leaf, from a point of a quadrature rule, from a point for its own sake,
+/// and from one whose rays over the hemisphere are known.
+const RAYS: [[usize; 2]; 4] = [[16, 16], [64, 64], [512, 1024], [0, 256]];
+/// Rays to the openings from the first three. With 1024 for a point's own sake, points are off by up to 1.1 % below a clear sky (CIE 171 5.9, twelve
+/// trials; .20 in root mean square) and by up to 1.2 % beside a wall of glass (four; .39), with 2048 by .46 (.10) and .60 (.17), in the same time (all
+/// with scrambled points).
+const OPENING_RAYS: [usize; 3] = [16, 64, 2048];
+/// Rays to the openings from a mirror image, of which there may be many, at the least.
+const LEAST_MIRRORED: usize = 64;
 
 /// Directions that find the transmittance of panes where all else is exact, in the same order.
 const TINTED: [usize; 4] = [16, 64, 512, 512];
@@ -43,6 +45,8 @@ pub(crate) struct Surroundings {
 pub(crate) struct SkyScratch {
     found: SkyIrradiance,
     choice: OpeningDistribution,
+    /// The point, the normal and the number of rays for which the openings are weighed in `choice`.
+    weighed: Option<((DVec3, DVec3), usize)>,
     segments: Vec<Segment>,
     open: Vec<(Search, DVec3)>,
     blocked: Vec<bool>,
@@ -85,8 +89,8 @@ pub(super) enum SkySampling<'a> {
     Rays(usize),
     /// These directions, of this many over the hemisphere, lead out of the room.
     Known(&'a [DVec3], usize),
-    /// `Known` for one of this many images, which share the rays to the openings.
-    Shared(&'a [DVec3], usize, usize),
+    /// `Known` for a mirror image: there may be many.
+    Mirrored(&'a [DVec3], usize),
     /// `Known` for one of many points, for which few rays to the openings are enough.
     Glanced(&'a [DVec3], usize),
     /// As if nothing stood in the way.
@@ -94,14 +98,34 @@ pub(super) enum SkySampling<'a> {
 }
 
 impl SkySampling<'_> {
+    /// Rays to the openings at the least and at the most; `known`: from a point whose rays over the hemisphere are known.
+    pub(super) fn opening_rays(self, known: [usize; 2]) -> [usize; 2] {
+        match self {
+            SkySampling::Known(..) => known,
+            SkySampling::Mirrored(..) => [LEAST_MIRRORED, known[1]],
+            _ => [OPENING_RAYS[self.kind()]; 2],
+        }
+    }
+
     /// The row of [`RAYS`].
     fn kind(self) -> usize {
         match self {
             SkySampling::Rays(kind) => kind,
             SkySampling::Glanced(..) | SkySampling::Unshadowed => 0,
-            SkySampling::Known(..) | SkySampling::Shared(..) => 3,
+            SkySampling::Known(..) | SkySampling::Mirrored(..) => 3,
         }
     }
+}
+
+/// How the openings are looked at from a point.
+#[derive(Clone, Copy)]
+pub(super) struct OpeningRays<'a> {
+    /// Rays at the least and at the most, see [`SkySampling::opening_rays`].
+    pub(super) range: [usize; 2],
+    /// How many are worth while where the openings bring so much light, as an irradiance where all light from outside on open ground is 1.
+    pub(super) enough: &'a dyn Fn(f64) -> usize,
+    /// Where it is weighed what they bring: of the many points of a leaf, at its middle, once for all.
+    pub(super) weighed_at: DVec3,
 }
 
 /// The places where rays from the surfaces of a room leave it, and the number of rays cast. Once it is interrupted no ray leaves any more, so
@@ -153,7 +177,7 @@ impl Surroundings {
         &self,
         (sight, by): (&Sight, Option<&dyn Obstacles>),
         to: &Receiver,
-        sampling: SkySampling,
+        (sampling, openings): (SkySampling, OpeningRays),
         look: &mut SkyScratch,
     ) -> [f64; PLACES] {
         (look.noise, look.tints) = ([0.0; PLACES], Default::default());
@@ -174,7 +198,7 @@ impl Surroundings {
             look.tints = std::mem::take(&mut look.found.tints);
             look.found.seen
         } else {
-            self.by_rays((sight, by), to, sampling, look)
+            self.by_rays((sight, by), to, (sampling, openings), look)
         }
     }
 
@@ -183,20 +207,19 @@ impl Surroundings {
     fn unshadowed(&self, to: &Receiver) -> [f64; PLACES] {
         let mut seen = self.openings.most(to.point, to.normal, |d| {
             let mut each = [0.0; PLACES];
-            let (first, radiance) = self.sky.radiance(d);
-            let plain = 1.0 - self.sky.excess_share(d);
-            for (each, radiance) in each[first..].iter_mut().zip(radiance) {
-                *each = PI * radiance * plain;
+            let seen = self.sky.look(d);
+            for (each, radiance) in each[seen.first..].iter_mut().zip(seen.radiance) {
+                *each = PI * radiance * (1.0 - seen.excess);
             }
             each
         });
-        let count = RAYS[0][2] as u32;
+        let count = RAYS[0][1] as u32;
         let spots = (0..count).filter_map(|k| self.sky.spot(sequence02(k, to.seed)));
         for d in spots {
-            let (first, radiance) = self.sky.radiance(d);
-            let density = f64::from(count) * self.sky.spot_density(d);
-            let weight = to.normal.dot(d).max(0.0) * self.sky.excess_share(d) / density;
-            for (seen, radiance) in seen[first..].iter_mut().zip(radiance) {
+            let spot = self.sky.look(d);
+            let density = f64::from(count) * spot.density;
+            let weight = to.normal.dot(d).max(0.0) * spot.excess / density;
+            for (seen, radiance) in seen[spot.first..].iter_mut().zip(spot.radiance) {
                 *seen += weight * radiance;
             }
         }
@@ -218,7 +241,13 @@ impl Surroundings {
         to: &Receiver,
         look: &mut SkyScratch,
     ) -> [f64; PLACES] {
-        self.seen((sight, None), to, SkySampling::Rays(0), look)
+        let sampling = SkySampling::Rays(0);
+        let openings = OpeningRays {
+            range: sampling.opening_rays([0; 2]),
+            enough: &|_| 0,
+            weighed_at: to.point,
+        };
+        self.seen((sight, None), to, (sampling, openings), look)
     }
 
     /// By rays over the hemisphere, to the openings and to spots.
@@ -226,22 +255,14 @@ impl Surroundings {
         &self,
         (sight, by): (&Sight, Option<&dyn Obstacles>),
         to: &Receiver,
-        sampling: SkySampling,
+        (sampling, openings): (SkySampling, OpeningRays),
         look: &mut SkyScratch,
     ) -> [f64; PLACES] {
-        let [wide, mut narrow, spots] = RAYS[sampling.kind()];
-        if let (SkySampling::Known(..) | SkySampling::Shared(..), true) = (sampling, sight.small())
-        {
-            // Rooms of few triangles come here because of mirrors and maps; a ray costs next to nothing in them.
-            narrow *= FEW;
-        }
-        if let SkySampling::Shared(.., images) = sampling {
-            narrow = (narrow / images.max(1)).max(RAYS[1][1]);
-        }
+        let [wide, spots] = RAYS[sampling.kind()];
         let wide = match sampling {
             SkySampling::Known(open, of)
-            | SkySampling::Glanced(open, of)
-            | SkySampling::Shared(open, of, _) => {
+            | SkySampling::Mirrored(open, of)
+            | SkySampling::Glanced(open, of) => {
                 look.open.clear();
                 look.open
                     .extend(open.iter().map(|&d| (Search::Hemisphere, d)));
@@ -252,7 +273,7 @@ impl Surroundings {
                 wide
             }
         };
-        self.look_through_openings((sight, by), to, narrow, look);
+        let narrow = self.look_through_openings((sight, by), to, openings, look);
         let spots = if self.sky.has_spots() { spots } else { 0 };
         self.look_at_spots((sight, by), to, spots, look);
         let counts = [wide, narrow, spots].map(|count| count as f64);
@@ -275,18 +296,22 @@ impl Surroundings {
         self.cast((sight, by), to, (Search::Spots, &ahead), look);
     }
 
-    /// Casts rays to the openings: adds the directions that lead outside.
+    /// Casts rays to the openings: adds the directions that lead outside. Returns their number.
     fn look_through_openings(
         &self,
         (sight, by): (&Sight, Option<&dyn Obstacles>),
         to: &Receiver,
-        count: usize,
+        openings: OpeningRays,
         look: &mut SkyScratch,
-    ) {
-        let plain = |d: DVec3| self.sky.plain(d);
-        let from = (to.point, to.normal);
-        self.openings
-            .weigh(count as f64, from, plain, &mut look.choice);
+    ) -> usize {
+        let plain = |d: DVec3| self.sky.look(d).plain;
+        let [least, most] = openings.range;
+        let (from, rays) = ((openings.weighed_at, to.normal), least as f64);
+        if look.weighed != Some((from, least)) {
+            self.openings.weigh(rays, from, plain, &mut look.choice);
+            look.weighed = Some((from, least));
+        }
+        let count = (openings.enough)(PI * look.choice.total()).clamp(least, most);
         let turn = hash(to.seed, 0x5c1);
         let toward = |k| {
             let at = self.openings.choose(&look.choice, sequence02(k, turn))?;
@@ -297,6 +322,7 @@ impl Surroundings {
             .filter(|d| to.normal.dot(*d) > 0.0)
             .collect();
         self.cast((sight, by), to, (Search::Openings, &ahead), look);
+        count
     }
 
     /// Adds those of some directions that lead outside: something may stand beyond an opening, too.
@@ -333,19 +359,19 @@ impl Surroundings {
             if cosine <= 0.0 {
                 continue;
             }
+            let outside = self.sky.look(d);
             let densities = [
                 counts[0] * cosine / PI,
                 counts[1] * self.openings.density(&look.choice, to.point, d),
-                counts[2] * self.sky.spot_density(d),
+                counts[2] * outside.density,
             ];
             let squared: f64 = densities.iter().map(|d| d * d).sum();
             let own = densities[search as usize];
-            let (first, radiance) = self.sky.radiance(d);
             let passage = by.filter(|by| by.change_light()).map(|by| {
                 let way = Segment::new(to.point, to.point + d * far, [NO_PLANE; 2]);
                 by.leave(&way)
             });
-            for (place, radiance) in (first..).zip(radiance) {
+            for (place, radiance) in (outside.first..).zip(outside.radiance) {
                 let brings = radiance * cosine * own / squared;
                 seen[place] += brings;
                 let mut left = brings;
@@ -354,7 +380,7 @@ impl Surroundings {
                     tints[place].add(passage.as_ref(), brings);
                 }
                 // Light of open ground is as even as that of a lamp.
-                if first == 0 || !self.sky.has_even_ground() {
+                if outside.first == 0 || !self.sky.has_even_ground() {
                     squares[place] += left * left;
                     sum[place] += left;
                 }

@@ -335,7 +335,7 @@ impl OpeningDistribution {
         self.parts.iter().map(worth)
     }
 
-    pub(super) fn total(&self) -> f64 {
+    pub(crate) fn total(&self) -> f64 {
         self.sums.last().copied().unwrap_or(0.0)
     }
 

@@ -107,6 +107,20 @@ pub struct Sky {
     pub(super) bright: [f64; PLACES],
 }
 
+/// What is seen of a sky in one direction.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct SeenSky {
+    /// Place of the first of the parts seen, and the radiance of each, as of [`Sky::radiance`].
+    pub(crate) first: usize,
+    pub(crate) radiance: [f64; PARTS],
+    /// How much of that [`Sky::spot`] finds, a share.
+    pub(crate) excess: f64,
+    /// About how bright the rest is, as a radiance under a whole irradiance of 1.
+    pub(crate) plain: f64,
+    /// Density, by solid angle, with which [`Sky::spot`] finds the direction.
+    pub(crate) density: f64,
+}
+
 impl Sky {
     /// Radiance of each part from a direction, and the place of the first of them: 0 from above the horizon, [`PARTS`] from below.
     #[inline]
@@ -141,19 +155,32 @@ impl Sky {
         !self.below
     }
 
-    /// About how bright it is in a direction, as a radiance under a whole irradiance of 1, less what [`Self::spot`] finds.
-    pub(crate) fn plain(&self, direction: DVec3) -> f64 {
-        let (first, radiance) = self.radiance(direction);
-        let bright = self.bright[first..].iter().zip(radiance);
-        let bright: f64 = bright.map(|(bright, radiance)| bright * radiance).sum();
-        bright * (1.0 - self.excess_share(direction))
-    }
-
-    /// How much of what comes from a direction [`spot`](Self::spot) finds, a share.
-    pub(crate) fn excess_share(&self, direction: DVec3) -> f64 {
-        match &self.dome {
-            Dome::Map(map) if direction.y > 0.0 || self.below => map.excess_share(direction),
-            _ => 0.0,
+    /// What is seen of it in a direction.
+    pub(crate) fn look(&self, direction: DVec3) -> SeenSky {
+        let up = direction.y > 0.0;
+        let (first, radiance, excess, density) = match &self.dome {
+            Dome::Map(map) if up || self.below => {
+                let first = if up { 0 } else { PARTS };
+                let texel = map.texel(direction);
+                let radiance = map.radiance_of(texel, up);
+                (
+                    first,
+                    radiance,
+                    map.excess_share(texel),
+                    map.spot_density(texel),
+                )
+            }
+            _ => {
+                let (first, radiance) = self.radiance(direction);
+                (first, radiance, 0.0, 0.0)
+            }
+        };
+        SeenSky {
+            first,
+            radiance,
+            excess,
+            plain: self.brightness(up, radiance) * (1.0 - excess),
+            density,
         }
     }
 
@@ -200,14 +227,6 @@ impl Sky {
         match &self.dome {
             Dome::Map(map) => map.spot(sample),
             Dome::Cie(_) | Dome::Spectral(_) => None,
-        }
-    }
-
-    /// Density, by solid angle, with which [`spot`](Self::spot) finds a direction.
-    pub(crate) fn spot_density(&self, direction: DVec3) -> f64 {
-        match &self.dome {
-            Dome::Map(map) => map.spot_density(direction),
-            Dome::Cie(_) | Dome::Spectral(_) => 0.0,
         }
     }
 }

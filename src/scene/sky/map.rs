@@ -49,6 +49,8 @@ pub struct Map {
     /// Excess over the mean in all rows up to one, times solid angle; and within each row, as shares of it.
     rows: Vec<f64>,
     columns: Vec<f32>,
+    /// For each row, the chance that [`spot`](Self::spot) takes it over the solid angle of one of its texels.
+    row_density: Vec<f64>,
 }
 
 impl Map {
@@ -71,6 +73,7 @@ impl Map {
             mean: 0.0,
             rows: Vec::new(),
             columns: Vec::new(),
+            row_density: Vec::new(),
         };
         let sun = if wanted.sun { map.take_sun() } else { None };
         if !wanted.below {
@@ -114,17 +117,22 @@ impl Map {
     /// Radiance of each part, of which a plane that faces its half has an irradiance of 1.
     #[inline]
     pub(super) fn radiance(&self, direction: DVec3) -> [f64; PARTS] {
-        let texel = self.texels[self.texel(direction)];
-        let levels = &self.levels[usize::from(direction.y <= 0.0)];
+        self.radiance_of(self.texel(direction), direction.y > 0.0)
+    }
+
+    /// The same of a texel, above the horizon or below it.
+    pub(super) fn radiance_of(&self, texel: usize, up: bool) -> [f64; PARTS] {
+        let texel = self.texels[texel];
+        let levels = &self.levels[usize::from(!up)];
         std::array::from_fn(|k| match levels[k] > 0.0 {
             true => f64::from(texel[k]) / levels[k],
             false => 0.0,
         })
     }
 
-    /// How much of the luminance of a direction is above the mean, a share.
-    pub(super) fn excess_share(&self, direction: DVec3) -> f64 {
-        let bright = self.bright(self.texel(direction));
+    /// How much of the luminance of a texel is above the mean, a share.
+    pub(super) fn excess_share(&self, texel: usize) -> f64 {
+        let bright = self.bright(texel);
         match bright > self.mean {
             true => 1.0 - self.mean / bright,
             false => 0.0,
@@ -157,21 +165,15 @@ impl Map {
         Some(DVec3::new(out * cos, height, out * sin))
     }
 
-    /// Density, by solid angle, with which [`spot`](Self::spot) finds a direction.
-    pub(super) fn spot_density(&self, direction: DVec3) -> f64 {
-        let Some(all) = self.rows.last().copied().filter(|&all| all > 0.0) else {
-            return 0.0;
-        };
-        let texel = self.texel(direction);
+    /// Density, by solid angle, with which [`spot`](Self::spot) finds a direction that ends in a texel.
+    pub(super) fn spot_density(&self, texel: usize) -> f64 {
         let (row, column) = (texel / self.width, texel % self.width);
-        let before = row.checked_sub(1).map_or(0.0, |k| self.rows[k]);
-        let of_row = (self.rows[row] - before) / all;
-        of_row * within(self.columns(row), column)[1] / self.solid_angle(row)
+        self.row_density[row] * within(self.columns(row), column)[1]
     }
 
     /// The texel of a direction.
     #[inline]
-    fn texel(&self, direction: DVec3) -> usize {
+    pub(super) fn texel(&self, direction: DVec3) -> usize {
         let down = direction.y.clamp(-1.0, 1.0).acos() / PI;
         let along = (direction.z.atan2(direction.x) - self.turn) / TAU + 0.5;
         let row = ((down * self.height as f64) as usize).min(self.height - 1);
@@ -252,6 +254,13 @@ impl Map {
             all += sum * self.solid_angle(row);
             rows.push(all);
         }
+        let before = [0.0].into_iter().chain(rows.iter().copied());
+        let of_row = rows.iter().zip(before).map(|(upto, before)| upto - before);
+        let of_row = of_row.enumerate().map(|(row, excess)| match all > 0.0 {
+            true => excess / all / self.solid_angle(row),
+            false => 0.0,
+        });
+        self.row_density = of_row.collect();
         (self.rows, self.columns) = (rows, columns);
     }
 }
@@ -321,9 +330,9 @@ mod tests {
         for k in 0..n {
             let d = map.spot(sequence02(k, 7)).unwrap();
             assert!((d.length() - 1.0).abs() < 1e-12);
-            let density = map.spot_density(d);
+            let density = map.spot_density(map.texel(d));
             assert!(density > 0.0);
-            sum += map.bright(map.texel(d)) * map.excess_share(d) / density;
+            sum += map.bright(map.texel(d)) * map.excess_share(map.texel(d)) / density;
         }
         let all = map.rows.last().unwrap();
         assert!((sum / f64::from(n) / all - 1.0).abs() < 1e-3, "{sum} {all}");

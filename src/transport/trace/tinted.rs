@@ -82,11 +82,14 @@ impl TintedEntries {
         if self.entries.is_empty() {
             return;
         }
-        let key = |(passed, entry): &(Passed, Entry)| (passed.clone(), entry.kind, entry.id);
+        let order = |a: &(Passed, Entry), b: &(Passed, Entry)| {
+            let rest = |entry: &Entry| (entry.kind, entry.id);
+            a.0.cmp(&b.0).then_with(|| rest(&a.1).cmp(&rest(&b.1)))
+        };
         // Stable, so that sums do not depend on the sort.
-        self.entries.sort_by_cached_key(key);
+        self.entries.sort_by(order);
         self.entries.dedup_by(|next, kept| {
-            let same = key(next) == key(kept);
+            let same = order(next, kept).is_eq();
             if same {
                 kept.1.weight += next.1.weight;
             }
