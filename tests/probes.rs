@@ -291,7 +291,7 @@ fn the_file_says_what_probe_prints() {
         "-o",
         &path("r.glb"),
         "--error",
-        "2",
+        "8",
         "--probes",
         "1",
     ]);
@@ -327,7 +327,7 @@ fn the_file_says_what_probe_prints() {
             "--points",
             &path("p.csv"),
             "--error",
-            "2",
+            "8",
             "--json",
         ]);
         let printed: Value = serde_json::from_str(&printed).unwrap();

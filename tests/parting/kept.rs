@@ -1,6 +1,6 @@
 //! Layers in files for NumPy and in caches.
 
-use super::{haarlight, layers, loaded, parted, scenes, sums_up, two_lamps};
+use super::{glanced, haarlight, layers, loaded, scenes, sums_up, two_lamps};
 use crate::common::every_effect::small;
 use haarlight::gather::{Baked, BakedSurface};
 use haarlight::keep::Relighter;
@@ -21,11 +21,7 @@ fn spectra_of_layers_add_up() {
             small(&[EffectKind::Sky, EffectKind::Fluorescence]),
         ),
     ] {
-        let mut bake = parted(scene, 4.0);
-        while bake.rounds().is_empty() {
-            bake.step();
-        }
-        let baked = bake.baked(&|_, _| {});
+        let (bake, baked) = glanced(scene);
         let whole = bake.radiosity_spectra(&baked);
         let names = &layers(&bake).names;
         let each: Vec<_> = (0..names.len())

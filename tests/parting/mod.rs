@@ -13,6 +13,7 @@ use haarlight::color::de2000;
 use haarlight::error::Error;
 use haarlight::gather::{Baked, BakedSurface};
 use haarlight::lightmap::{MapLimits, MapPage};
+use haarlight::mesh::Limits;
 use haarlight::output::{BakedGlb, Exposure, Packing, Writing, baked_glb};
 use haarlight::scene::layers::{Layers, MOST_LAYERS};
 use haarlight::scene::{LightKind, Options, Scene};
@@ -112,6 +113,11 @@ fn sums_up(bake: &Bake, baked: &Baked, what: &str) {
     let count = layers(bake).names.len();
     assert!(baked.surfaces.iter().all(|s| s.layers.len() == count));
     let (worst, brightest) = lack(&baked.surfaces);
+    let vertices = baked.surfaces.iter().map(|s| s.vertices.len());
+    println!(
+        "{what}: {worst:e} of {brightest} at {} vertices",
+        vertices.sum::<usize>()
+    );
     assert!(
         brightest > 0.0 && worst <= LACK * brightest,
         "{what}: {worst} of {brightest}"
@@ -126,6 +132,25 @@ fn sums_up(bake: &Bake, baked: &Baked, what: &str) {
     }
 }
 
+/// One round of a room, and a mesh of few vertices: that layers add up takes no light that is right.
+fn glanced(mut scene: Scene) -> (Bake, Baked) {
+    scene.part_lamps().unwrap();
+    let mut bake = Bake::new(
+        scene,
+        Settings {
+            error: 4.0,
+            ..Settings::default()
+        },
+    );
+    bake.step();
+    let limits = Limits {
+        vertices: Some(4000),
+        ..Limits::default()
+    };
+    let baked = bake.baked_within(&limits, &|_, _| {});
+    (bake, baked)
+}
+
 #[test]
 fn layers_at_vertices_add_up_in_all_kinds_of_rooms() {
     let bake = parted(two_lamps(), 1.0);
@@ -137,15 +162,15 @@ fn layers_at_vertices_add_up_in_all_kinds_of_rooms() {
         ("two-rooms.glb", 2),
         ("daylit.glb", 2),
     ] {
-        let bake = parted(loaded(name, None), 4.0);
+        let (bake, baked) = glanced(loaded(name, None));
         assert_eq!(layers(&bake).names.len(), count, "{name}");
         assert!(bake.lanes().len() <= BANDS);
-        sums_up(&bake, &bake.baked(&|_, _| {}), name);
+        sums_up(&bake, &baked, name);
     }
     // Lamp, sky and sun.
-    let bake = parted(small(&EFFECTS), 4.0);
+    let (bake, baked) = glanced(small(&EFFECTS));
     assert_eq!(layers(&bake).names.len(), 3);
-    sums_up(&bake, &bake.baked(&|_, _| {}), "all effects");
+    sums_up(&bake, &baked, "all effects");
 }
 
 /// The mean error that a bake states.
