@@ -77,7 +77,7 @@ impl Audit<'_> {
             (Some(openings), Some(choice)) => openings.density(choice, at.point, direction),
             _ => 0.0,
         };
-        cosine / PI + sky.look(direction).density + through
+        cosine / PI + sky.spot_density(direction) + through
     }
 
     /// What a path that leaves the room brings from there, in a direction chosen by the cosine, or turned by so many mirrors: these are

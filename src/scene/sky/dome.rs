@@ -158,29 +158,23 @@ impl Sky {
     /// What is seen of it in a direction.
     pub(crate) fn look(&self, direction: DVec3) -> SeenSky {
         let up = direction.y > 0.0;
-        let (first, radiance, excess, density) = match &self.dome {
-            Dome::Map(map) if up || self.below => {
-                let first = if up { 0 } else { PARTS };
-                let texel = map.texel(direction);
-                let radiance = map.radiance_of(texel, up);
-                (
-                    first,
-                    radiance,
-                    map.excess_share(texel),
-                    map.spot_density(texel),
-                )
-            }
-            _ => {
-                let (first, radiance) = self.radiance(direction);
-                (first, radiance, 0.0, 0.0)
-            }
+        let texel = match &self.dome {
+            Dome::Map(map) => Some((map, map.texel(direction))),
+            Dome::Cie(_) | Dome::Spectral(_) => None,
         };
+        // Spots may reach below the horizon, where open ground hides what the map shows.
+        let shown = texel.filter(|_| up || self.below);
+        let radiance = match shown {
+            Some((map, texel)) => map.radiance_of(texel, up),
+            None => self.radiance(direction).1,
+        };
+        let excess = shown.map_or(0.0, |(map, texel)| map.excess_share(texel));
         SeenSky {
-            first,
+            first: if up { 0 } else { PARTS },
             radiance,
             excess,
             plain: self.brightness(up, radiance) * (1.0 - excess),
-            density,
+            density: texel.map_or(0.0, |(map, texel)| map.spot_density(texel)),
         }
     }
 
@@ -228,5 +222,52 @@ impl Sky {
             Dome::Map(map) => map.spot(sample),
             Dome::Cie(_) | Dome::Spectral(_) => None,
         }
+    }
+
+    /// Density, by solid angle, with which [`spot`](Self::spot) finds a direction.
+    pub(crate) fn spot_density(&self, direction: DVec3) -> f64 {
+        match &self.dome {
+            Dome::Map(map) => map.spot_density(map.texel(direction)),
+            Dome::Cie(_) | Dome::Spectral(_) => 0.0,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::map::Wanted;
+    use super::super::picture::SkyPicture;
+    use super::*;
+    use crate::geometry::sampling::sequence02;
+
+    /// The middle one of three rows is the brightest, and the horizon cuts it.
+    #[test]
+    fn spots_below_the_horizon_have_their_density() {
+        let texels = (0..18).map(|k| [if k / 6 == 1 { 9.0 } else { 1.0 }; 3]);
+        let picture = SkyPicture::shrunk(6, 3, texels.collect());
+        let wanted = Wanted {
+            sun: false,
+            below: false,
+        };
+        let (map, _) = Map::new(picture, [0.2, 0.7, 0.1], 0.0, wanted);
+        let sky = Sky {
+            dome: Dome::Map(Arc::new(map)),
+            said: String::new(),
+            sun_said: None,
+            sun_of_file: false,
+            below: false,
+            bright: [1.0 / PLACES as f64; PLACES],
+        };
+        let mut below = 0;
+        for k in 0..64 {
+            let d = sky.spot(sequence02(k, 3)).unwrap();
+            let seen = sky.look(d);
+            assert!(seen.density > 0.0 && seen.density == sky.spot_density(d));
+            if d.y <= 0.0 {
+                below += 1;
+                assert_eq!((seen.excess, seen.radiance), (0.0, sky.radiance(d).1));
+            }
+        }
+        assert!(below > 16, "{below}");
     }
 }
