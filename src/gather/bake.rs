@@ -164,7 +164,7 @@ impl Bake {
             normal,
             plane: mesh.plane[triangle],
             leaf,
-            // One pattern of rays for all: neighbours err alike, which does not show.
+            // One pattern of rays for all, so that neighbours err alike, unless they are told apart, see `mesh::looks`.
             seed: 0,
         }
     }

@@ -14,7 +14,7 @@ use crate::gather::{Baked, BakedSurface, LayerLanes, MapPlace, SurfaceResponse};
 use crate::mesh::looks::Looks;
 use crate::mesh::measure::summed;
 use crate::mesh::turns::Turns;
-use crate::solve::{Bake, GatherQuality, INTERPOLATION_SHARE};
+use crate::solve::{Bake, Effort, GatherQuality, INTERPOLATION_SHARE};
 use glam::DVec2;
 use rayon::prelude::*;
 use std::collections::{BTreeMap, HashMap};
@@ -58,7 +58,12 @@ impl Bake {
     pub fn light_maps(&self, limits: &MapLimits, progress: &dyn Fn(usize, usize)) -> LightMaps {
         let spaces = self.spaces();
         let all = charts(self.scene(), self.mesh(), self.tree(), &spaces, &Conformal);
-        let mut looks = Looks::new(self, spaces.clone(), GatherQuality::Vertex, limits.late);
+        let mut looks = Looks::new(
+            self,
+            spaces.clone(),
+            GatherQuality::Vertex(Effort::default()),
+            limits.late,
+        );
         looks.indirect = limits.indirect;
         let more = AT / self.settings().error;
         let budget = Budget {

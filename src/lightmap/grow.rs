@@ -19,6 +19,8 @@ use glam::DVec2;
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
+/// Variance by chance of the difference between a look and the mean of two, in variances of a look.
+const LINE: f64 = 1.5;
 /// Cells are no longer than this share of the room's half diagonal at the beginning, so that what no leaf tells of is found.
 const LONGEST: f64 = 0.125;
 /// Charts smaller than this share of the room's half diagonal are one texel, until that proves wrong.
@@ -395,7 +397,8 @@ impl<'a> LightmapGrowth<'a> {
             }
             let off = self.difference(mix(&light, share), self.sampler.seen(sample)?);
             // What chance alone may do is no bend.
-            Some((off * off - BY_CHANCE * self.noise).max(0.0).sqrt())
+            let chance = LINE * self.noise;
+            Some((off * off - BY_CHANCE * chance).max(0.0).sqrt())
         };
         let seen: Vec<Option<f64>> = middles.iter().map(off).collect();
         let count = seen.iter().flatten().count();
@@ -500,13 +503,18 @@ pub(super) mod tests {
     use crate::lightmap::charts::charts;
     use crate::lightmap::unwrap::Conformal;
     use crate::mesh::looks::Looks;
-    use crate::solve::GatherQuality;
+    use crate::solve::{Effort, GatherQuality};
     use crate::transport::tests::baked;
 
     pub(in crate::lightmap) fn begun(bake: &Bake) -> LightmapGrowth<'_> {
         let spaces = bake.spaces();
         let all = charts(bake.scene(), bake.mesh(), bake.tree(), &spaces, &Conformal);
-        let looks = Looks::new(bake, spaces, GatherQuality::Vertex, &|| false);
+        let looks = Looks::new(
+            bake,
+            spaces,
+            GatherQuality::Vertex(Effort::default()),
+            &|| false,
+        );
         let budget = Budget {
             looks: 100_000,
             texels: 100_000,

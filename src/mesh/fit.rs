@@ -22,11 +22,12 @@ impl MeshGrowth<'_> {
         let mut missed = vec![[0.0; 2]; self.looks.len()];
         let mut beyond: HashMap<u32, Vec<(u32, f64)>> = HashMap::new();
         let rims = self.rims();
+        let light = self.smoothed();
         for cell in &self.cells.all {
             let sheet = cell.sheet as usize;
             let seen = |vertex: u32| {
                 let look = self.look(sheet, vertex)?;
-                Some((look, self.looks.at(look)?.xyz[1]))
+                self.looks.at(look).map(|_| (look, light[look as usize]))
             };
             let corners = cell.corners.map(|c| seen(c.vertex));
             let looked = |k: usize| self.cells.known_middle(cell, k).and_then(seen);
@@ -67,13 +68,14 @@ impl MeshGrowth<'_> {
         }
         let fitted = |(look, [missed, area]): (u32, [f64; 2])| {
             let own = self.looks.at(look).map_or(0.0, |seen| seen.xyz[1]);
-            if missed == 0.0 || own <= 0.0 || area <= 0.0 {
+            if own <= 0.0 || area <= 0.0 {
                 return (look, 1.0);
             }
-            let fit = own + missed / area;
+            let fit = (light[look as usize] + missed / area).max(0.0);
             let off = |(_, lux): &(u32, f64)| (lux - fit).abs();
             let all = beyond.get(&look).into_iter().flatten().copied();
             let best = all
+                .filter(|(_, lux)| *lux > 0.0)
                 .chain([(look, own)])
                 .min_by(|a, b| off(a).total_cmp(&off(b)));
             best.map_or((look, 1.0), |(from, lux)| (from, (fit / lux) as f32))

@@ -105,18 +105,24 @@ impl<'a> MeshGrowth<'a> {
         seen_difference(a, b, self.white)
     }
 
+    pub(super) fn white(&self) -> [f64; 3] {
+        self.white
+    }
+
     /// Asks for looks at the vertices of some cells.
     fn want_corners(&mut self, cells: &[usize]) {
         for &k in cells {
             let cell = &self.cells.all[k];
             let (sheet, vertices) = (cell.sheet as usize, cell.corners.map(|c| c.vertex));
+            let area = cell.counted() / 3.0;
             for vertex in vertices {
-                self.want(sheet, vertex);
+                self.want(sheet, vertex, area);
             }
         }
     }
 
-    pub(super) fn want(&mut self, sheet: usize, vertex: u32) -> u32 {
+    /// Asks for a look at a vertex that is to stand for that area besides what it stood for before.
+    pub(super) fn want(&mut self, sheet: usize, vertex: u32, area: f64) -> u32 {
         let looked = &mut self.looked[sheet];
         let sheet = &self.cells.sheets[sheet];
         looked.resize(sheet.vertices.len(), UNKNOWN);
@@ -128,6 +134,7 @@ impl<'a> MeshGrowth<'a> {
                 None => self.looks.want(own, sheet.surface, sheet.back),
             };
         }
+        self.looks.stand_for(*look, area);
         *look
     }
 
@@ -192,6 +199,12 @@ impl<'a> MeshGrowth<'a> {
             };
             seen.or_else(lent).unwrap_or_default()
         })
+    }
+
+    /// Variance of a vertex by chance, a multiple of that of a look of the usual effort; 0 without a look.
+    pub(super) fn variance(&self, sheet: usize, vertex: u32) -> f64 {
+        let look = self.look(sheet, vertex);
+        look.map_or(0.0, |look| self.looks.variance(look))
     }
 
     fn seen(&self, sheet: usize, vertex: u32) -> Option<[f64; 3]> {
@@ -409,7 +422,8 @@ impl<'a> MeshGrowth<'a> {
         for (&k, (_, _, worst)) in cells.iter().zip(&told) {
             let sheet = self.cells.all[k].sheet as usize;
             let middles = [0, 1, 2].map(|e| self.cells.middle(k, e));
-            let middles = middles.map(|vertex| self.want(sheet, vertex));
+            let area = self.cells.all[k].counted() / 3.0;
+            let middles = middles.map(|vertex| self.want(sheet, vertex, area));
             let cell = &self.cells.all[k];
             let weights = match worst {
                 Some((hint, _)) => within(&cell.corners, hint.at),
@@ -422,6 +436,7 @@ impl<'a> MeshGrowth<'a> {
             let inside = self.cells.divided.place(cell.of, cell.at(weights));
             let sheet = &self.cells.sheets[sheet];
             let inside = self.looks.want(&inside, sheet.surface, sheet.back);
+            self.looks.stand_for(inside, area);
             asked.push((middles, inside, weights));
         }
         self.looks.complete(progress);
@@ -438,14 +453,19 @@ impl<'a> MeshGrowth<'a> {
         (light, told, worst): Told,
         (middles, inside, weights): LookRequest,
     ) -> CellError {
+        let Cell { sheet, corners, .. } = &self.cells.all[k];
+        let variance = corners.map(|c| self.variance(*sheet as usize, c.vertex));
         let off = |look: u32, weights: [f64; 3]| {
             let seen = self.looks.at(look)?.xyz;
             let off = self.difference(mix(&light, weights), seen);
             // A difference that chance alone may cause is not a bend.
-            Some((off * off - BY_CHANCE * self.noise).max(0.0).sqrt())
+            let corners: f64 = (weights.iter().zip(variance))
+                .map(|(w, variance)| w * w * variance)
+                .sum();
+            let chance = self.noise * (self.looks.variance(look) + corners);
+            Some((off * off - BY_CHANCE * chance).max(0.0).sqrt())
         };
         let halves = [[0.5, 0.5, 0.0], [0.0, 0.5, 0.5], [0.5, 0.0, 0.5]];
-        let Cell { sheet, corners, .. } = &self.cells.all[k];
         let seen = corners.map(|c| self.seen(*sheet as usize, c.vertex).is_some());
         let mut looks = middles.into_iter().chain([inside]);
         if !seen.contains(&true) && looks.all(|look| self.looks.at(look).is_none()) {
@@ -504,14 +524,14 @@ pub(super) fn mix(light: &[[f64; 3]; 3], weights: [f64; 3]) -> [f64; 3] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::solve::GatherQuality;
+    use crate::solve::{Effort, GatherQuality};
     use crate::transport::tests::baked;
 
     /// However flat the triangle was of which they are halves.
     #[test]
     fn halves_expect_something_of_the_difference_of_their_corners() {
         let bake = baked("cornell.glb", 1);
-        let mut growth = bake.growth(GatherQuality::Vertex, &|| false);
+        let mut growth = bake.growth(GatherQuality::Vertex(Effort::default()), &|| false);
         growth.begin(&|_, _| {});
         let all: Vec<usize> = (0..growth.cells.all.len()).collect();
         for &k in &all {

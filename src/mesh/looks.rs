@@ -2,7 +2,9 @@
 
 use crate::gather::{MOSTLY, Vertex};
 use crate::geometry::Segment;
-use crate::solve::{Bake, GatherQuality};
+use crate::geometry::sampling::hash;
+use crate::solve::effort::typical;
+use crate::solve::{Bake, Effort, GatherQuality};
 use crate::transport::{Gathered, Receiver};
 use glam::DVec3;
 use std::collections::HashMap;
@@ -14,6 +16,8 @@ const SAME_NORMAL: f64 = 1e-4;
 /// A place below a black back that is darker than this share of the white counts as inside the thing that the back
 /// belongs to.
 pub(crate) const DIM: f64 = 0.05;
+/// Distinguishes the rays of looks from those of others.
+const SEED: u64 = 0x006c_6f6f_6b73;
 /// Places gathered at a time, so that progress shows and an interrupt is noticed: a look takes up to a millisecond in a dungeon of many
 /// lamps, and with eight times as many the gather went on for 12 to 20 s after Ctrl-C on two busy cores.
 const PART: usize = 2048;
@@ -37,6 +41,10 @@ type LookKey = ([i64; 6], (u32, bool), bool, Option<u32>);
 pub(crate) struct Looks<'a> {
     bake: &'a Bake,
     quality: GatherQuality,
+    /// Has each look rays of its own, so that looks err independently? Else neighbours err alike.
+    pub(crate) apart: bool,
+    /// The area that is worth the usual effort.
+    typical: f64,
     /// Is it time to end?
     late: &'a (dyn Fn() -> bool + Sync),
     /// Is everything looked at nevertheless?
@@ -49,6 +57,8 @@ pub(crate) struct Looks<'a> {
     /// Looks at a place: one for each side of what stands there.
     known: HashMap<LookKey, Vec<u32>>,
     places: Vec<(Receiver, bool)>,
+    /// The area that each look stands for, as far as it was known before the look; 0 where it is not known.
+    areas: Vec<f64>,
     /// None: something solid covers the place, or lies right upon it.
     seen: Vec<Option<PlaceLight>>,
     pub(crate) rays: u64,
@@ -61,9 +71,12 @@ impl<'a> Looks<'a> {
         quality: GatherQuality,
         late: &'a (dyn Fn() -> bool + Sync),
     ) -> Self {
+        let leaves = bake.light().leaves.iter();
         Self {
             bake,
             quality,
+            apart: false,
+            typical: typical(leaves.map(|&leaf| bake.tree().node(leaf).counted)),
             late,
             patient: false,
             believing: false,
@@ -71,6 +84,7 @@ impl<'a> Looks<'a> {
             spaces,
             known: HashMap::new(),
             places: Vec::new(),
+            areas: Vec::new(),
             seen: Vec::new(),
             rays: 0,
         }
@@ -108,7 +122,12 @@ impl<'a> Looks<'a> {
             return *look;
         }
         let look = places.len() as u32;
-        places.push((to, believing));
+        let seed = match self.apart {
+            true => hash(u64::from(look), SEED ^ self.bake.settings().seed),
+            false => to.seed,
+        };
+        places.push((Receiver { seed, ..to }, believing));
+        self.areas.push(0.0);
         of_place.push(look);
         look
     }
@@ -157,6 +176,7 @@ impl<'a> Looks<'a> {
 
     fn once(&mut self, to: Receiver) -> u32 {
         self.places.push((to, false));
+        self.areas.push(0.0);
         self.places.len() as u32 - 1
     }
 
@@ -193,19 +213,54 @@ impl<'a> Looks<'a> {
             for k in believed {
                 self.seen[k] = self.told(&self.places[k].0);
             }
-            self.gather(open);
+            for effort in self.efforts(&open) {
+                let alike = open.iter().copied();
+                self.gather(
+                    alike.filter(|&k| self.effort(k) == effort).collect(),
+                    effort,
+                );
+            }
         }
         progress(wanted.len(), wanted.len());
     }
 
+    /// Variance of a look by chance, a multiple of the usual one.
+    pub(crate) fn variance(&self, look: u32) -> f64 {
+        self.effort(look as usize).noise().powi(2)
+    }
+
+    /// A look that is not done yet stands for this area, too.
+    pub(crate) fn stand_for(&mut self, look: u32, area: f64) {
+        if look as usize >= self.seen.len() {
+            self.areas[look as usize] += area.max(f64::MIN_POSITIVE);
+        }
+    }
+
+    /// What a look is worth.
+    fn effort(&self, look: usize) -> Effort {
+        Effort::worth(self.areas[look], self.typical)
+    }
+
+    /// All efforts among some looks.
+    fn efforts(&self, looks: &[usize]) -> Vec<Effort> {
+        let mut efforts: Vec<Effort> = looks.iter().map(|&k| self.effort(k)).collect();
+        efforts.sort_unstable();
+        efforts.dedup();
+        efforts
+    }
+
     /// Gathers at some places.
-    fn gather(&mut self, mut places: Vec<usize>) {
+    fn gather(&mut self, mut places: Vec<usize>, effort: Effort) {
         let receivers = |places: &[usize]| -> Vec<Receiver> {
             places.iter().map(|&k| self.places[k].0).collect()
         };
         let mut pressed = self.bake.pressed(&receivers(&places)).into_iter();
         places.retain(|_| pressed.next() == Some(false));
-        let gathered = self.bake.gather_shown(&receivers(&places), self.quality);
+        let quality = match self.quality {
+            GatherQuality::Vertex(_) => GatherQuality::Vertex(effort),
+            quality => quality,
+        };
+        let gathered = self.bake.gather_shown(&receivers(&places), quality);
         let dark =
             |g: &Gathered| g.backs <= MOSTLY && g.seen < 1e-3 && g.direct.iter().all(|&x| x == 0.0);
         let in_doubt = places.iter().zip(&gathered).filter(|(_, g)| dark(g));
@@ -263,6 +318,30 @@ fn less(mut all: [f32; 64], direct: &[f32; 64]) -> [f32; 64] {
 mod tests {
     use super::*;
     use crate::transport::tests::baked;
+    use std::collections::HashSet;
+
+    /// But for those of a picture on the way.
+    #[test]
+    fn looks_have_rays_of_their_own_and_are_worth_what_they_stand_for() {
+        let bake = baked("cornell.glb", 1);
+        let seeds = |quality| {
+            let mut growth = bake.growth(quality, &|| false);
+            growth.begin(&|_, _| {});
+            let looks = &growth.looks;
+            let seeds = looks.places.iter().map(|(to, _)| to.seed);
+            let efforts = (0..looks.len()).map(|look| looks.effort(look).samples());
+            (seeds.collect::<Vec<_>>(), efforts.collect::<Vec<_>>())
+        };
+        let (seen, efforts) = seeds(GatherQuality::Vertex(Effort::default()));
+        let apart: HashSet<u64> = seen.iter().copied().collect();
+        assert_eq!(apart.len(), seen.len());
+        // The walls are large, the lamp is small.
+        let most = efforts.iter().copied().fold(0.0, f64::max);
+        let least = efforts.iter().copied().fold(f64::INFINITY, f64::min);
+        assert!(most > least, "{most} {least}");
+        let (shared, _) = seeds(GatherQuality::Preview);
+        assert!(shared.iter().all(|seed| *seed == 0));
+    }
 
     /// At the foot of a block the floor on one side is not that on the other.
     #[test]

@@ -140,7 +140,8 @@ impl MeshGrowth<'_> {
         };
         let difference = |a, b| seen_difference(a, b, white);
         let sample = |&(cell, (corners, weights), looks): &PointLooks| {
-            let settled = &settled[self.cells.all[cell].sheet as usize];
+            let sheet = self.cells.all[cell].sheet as usize;
+            let settled = &settled[sheet];
             let [one, two] = looks.map(|look| self.looks.at(look).map(|seen| shown(&seen.row)));
             let (one, two) = (one?, two?);
             let light =
@@ -148,7 +149,8 @@ impl MeshGrowth<'_> {
             let drawn = mix(&light, weights);
             let noise = 0.5 * difference(one, two).powi(2);
             let seen = 0.5 * (difference(drawn, one).powi(2) + difference(drawn, two).powi(2));
-            let of_vertices: f64 = weights.iter().map(|w| w * w).sum();
+            let of_vertex = |(v, w): (&u32, f64)| w * w * self.variance(sheet, *v);
+            let of_vertices: f64 = corners.iter().zip(weights).map(of_vertex).sum();
             let square = seen - (1.0 + of_vertices) * noise;
             Some(ErrorSample {
                 cell,

@@ -23,11 +23,12 @@ mod shades;
 mod shadow;
 mod sides;
 mod skins;
+mod smooth;
 pub(crate) mod turns;
 mod write;
 
 use crate::gather::Baked;
-use crate::solve::{Bake, GatherQuality, INTERPOLATION_SHARE};
+use crate::solve::{Bake, Effort, GatherQuality, INTERPOLATION_SHARE};
 use cells::Cells;
 use grow::MeshGrowth;
 use looks::Looks;
@@ -88,7 +89,7 @@ impl Bake {
 
     /// [`Bake::baked`] within limits: where these end growing, with the error reached.
     pub fn baked_within(&self, limits: &Limits, progress: &dyn Fn(usize, usize)) -> Baked {
-        let mut growth = self.growth(GatherQuality::Vertex, limits.late);
+        let mut growth = self.growth(GatherQuality::Vertex(Effort::default()), limits.late);
         let allowed = INTERPOLATION_SHARE * self.settings().error;
         growth.allowed = allowed;
         if let Some(vertices) = limits.vertices {
@@ -195,7 +196,9 @@ impl Bake {
         let spaces = self.spaces();
         let mut cells = Cells::new(self.scene(), self.mesh(), self.tree(), &spaces);
         hints::give(self, &mut cells);
-        let looks = Looks::new(self, spaces, quality, late);
+        let mut looks = Looks::new(self, spaces, quality, late);
+        // Pictures on the way have few rays, and what they differ by is not evened out.
+        looks.apart = quality != GatherQuality::Preview;
         MeshGrowth::new(
             cells,
             looks,

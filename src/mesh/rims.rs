@@ -48,7 +48,9 @@ impl MeshGrowth<'_> {
                 for [edge, b] in edges.into_iter().flatten() {
                     if self.difference(light[a], light[b]) > self.allowed {
                         let middle = self.cells.middle(k, edge);
-                        self.want(self.cells.all[k].sheet as usize, middle);
+                        let cell = &self.cells.all[k];
+                        let (sheet, area) = (cell.sheet as usize, cell.counted() / 3.0);
+                        self.want(sheet, middle, area);
                     }
                 }
             }

@@ -23,8 +23,8 @@ const TOGETHER: usize = 32;
 pub(crate) const EXCESS: f64 = 1.2;
 /// Edges that bend by this share of the worst are split with it.
 pub(crate) const BENDS: f64 = 0.5;
-/// Looks differ by chance: squares of differences up to this many times the variance of a look are ignored.
-pub(crate) const BY_CHANCE: f64 = 2.0;
+/// Looks differ by chance: squares of differences up to this many times what chance makes of them are ignored.
+pub(crate) const BY_CHANCE: f64 = 4.0 / 3.0;
 /// Until it is looked at, a triangle is expected to err by at least this share of the difference between its corners. When only triangles of the
 /// input expected that, light stayed unseen inside their halves: with it for all, and [`SQUARE`], the error of `--error 1` between vertices is .14,
 /// .36 and .48 in a sunlit room, a flat and a living room (root mean square .6, .7, 1.8) with 10,700, 3,100 and 71,000 vertices, without .18, .27 and

@@ -73,6 +73,7 @@ impl Bake {
         }
         self.room.with_sight(|sight| {
             let sketched = Hemisphere::sketch();
+            let scaled;
             let mut gatherer = self.gatherer(sight);
             if let (GatherQuality::Preview, Some(hemisphere)) = (quality, &mut gatherer.hemisphere)
             {
@@ -81,7 +82,16 @@ impl Bake {
             match quality {
                 GatherQuality::Full => gatherer.allowed_noise = NOISE_AT_POINT,
                 GatherQuality::Watched => {}
-                GatherQuality::Vertex | GatherQuality::Preview => {
+                GatherQuality::Vertex(effort) => {
+                    gatherer.most_backs = MOSTLY;
+                    gatherer.allowed_noise = NOISE_AT_VERTEX.by(effort.samples());
+                    gatherer.tolerance *= effort.noise();
+                    if let Some(hemisphere) = &mut gatherer.hemisphere {
+                        scaled = hemisphere.scaled(effort.samples());
+                        *hemisphere = &scaled;
+                    }
+                }
+                GatherQuality::Preview => {
                     gatherer.most_backs = MOSTLY;
                     gatherer.allowed_noise = NOISE_AT_VERTEX;
                 }

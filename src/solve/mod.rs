@@ -10,6 +10,7 @@ mod coarse;
 mod cuts;
 mod direct;
 mod early;
+pub(crate) mod effort;
 mod estimate;
 mod fixed_links;
 mod fluorescing;
@@ -45,6 +46,7 @@ mod sums;
 mod threshold_factors;
 mod tinted;
 
+pub(crate) use effort::Effort;
 pub use lists::PatchList;
 pub use lit::Averages;
 pub use record::{Round, Verdict};
@@ -101,8 +103,8 @@ pub(crate) enum GatherQuality {
     Full,
     /// Watched points, by which the error is estimated.
     Watched,
-    /// Vertices: nobody sees those that lie inside something, and as there are many, they follow fewer paths.
-    Vertex,
+    /// Vertices: nobody sees those that lie inside something, and as there are many, they follow fewer paths, and are worth as much as the surface about them.
+    Vertex(Effort),
     /// A picture of an unfinished bake.
     Preview,
 }

@@ -57,6 +57,18 @@ pub(crate) struct AllowedNoise {
     pub(crate) most_turns: f64,
 }
 
+impl AllowedNoise {
+    /// With so many times the samples.
+    pub(crate) fn by(self, samples: f64) -> Self {
+        let times = |n: usize| ((n as f64 * samples) as usize).max(1);
+        Self {
+            most_rays: times(self.most_rays),
+            most_turns: (self.most_turns * samples).max(1.0),
+            ..self
+        }
+    }
+}
+
 /// Reused memory of one thread and its ray count.
 #[derive(Debug, Default)]
 pub struct Memory {

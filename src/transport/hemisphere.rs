@@ -37,6 +37,11 @@ impl Hemisphere {
         Self::new(COUNT[0])
     }
 
+    /// With so many times the directions, a power of two, as far as there may be so many.
+    pub(crate) fn scaled(&self, samples: f64) -> Self {
+        Self::new(((self.len() as f64 * samples) as usize).clamp(COUNT[0], COUNT[1]))
+    }
+
     /// `count` directions, a power of two, at least 16.
     pub(crate) fn new(count: usize) -> Self {
         let beams = count / BEAM;

@@ -239,7 +239,7 @@ fn believed(pairs: &[[f64; 2]]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::solve::GatherQuality;
+    use crate::solve::{Effort, GatherQuality};
     use crate::transport::MOSTLY;
     use crate::transport::tests::{baked, middle};
 
@@ -250,7 +250,7 @@ mod tests {
         let leaves = bake.tree().leaves().step_by(17);
         let places: Vec<Receiver> = leaves.map(|leaf| middle(bake.tree(), leaf)).collect();
         let points = bake.gather_with(&places, GatherQuality::Full);
-        let vertices = bake.gather_with(&places, GatherQuality::Vertex);
+        let vertices = bake.gather_with(&places, GatherQuality::Vertex(Effort::default()));
         let both = points.iter().zip(&vertices);
         let (mut more, mut fewer) = (0, 0);
         // What lies inside something is not gathered at a vertex.
@@ -259,6 +259,38 @@ mod tests {
             fewer += usize::from(point.rays < vertex.rays);
         }
         assert!(more > 40 && fewer == 0, "{more} {fewer}");
+    }
+
+    /// As rays over the hemisphere do: twice the light of leaves that are twice as bright there, none of those that are black.
+    #[test]
+    fn paths_end_on_leaves_that_are_not_even() {
+        let bake = baked("furnished.glb", 2);
+        let ends: Vec<Receiver> = (bake.tree().leaves().step_by(17))
+            .map(|leaf| middle(bake.tree(), leaf))
+            .collect();
+        let arrived = |tilt: f32| -> f64 {
+            let mut light = bake.light().clone();
+            light.tilts.0.fill([tilt; 3]);
+            bake.room.with_sight(|sight| {
+                let gatherer = Gatherer {
+                    light: &light,
+                    ..bake.gatherer(sight)
+                };
+                let path = |(sample, &end): (u32, &Receiver)| LightPath {
+                    sample,
+                    end: Some(end),
+                    through: 1.0,
+                    sum: 0.0,
+                    leaf: 0.0,
+                };
+                let mut paths: Vec<LightPath> = (0..).zip(&ends).map(path).collect();
+                gatherer.go_on(&mut paths, |_, _| true, [1, 2], &mut Memory::default());
+                paths.iter().map(|path| path.sum).sum()
+            })
+        };
+        let [none, even, twice] = [-1.0, 0.0, 1.0].map(arrived);
+        assert!(even > 1.5 * none, "{even} {none}");
+        assert!((twice - none - 2.0 * (even - none)).abs() < 1e-6 * twice);
     }
 
     #[test]
