@@ -3,7 +3,7 @@
 //! In cluttered rooms nearly every link of a point is partly hidden, and rays to each patch in turn cost more than rays
 //! that find the patches themselves: one ray then gives form factor and visibility at once. All points share one pattern
 //! of directions (a (0,2)-sequence, Kollig and Keller 2002, on the concentric map of Shirley and Chiu 1997), in beams of
-//! sixteen. Neighbouring vertices then err alike: no blotches.
+//! sixteen, turned about the normal by the point's seed.
 
 use crate::geometry::sampling::sequence02;
 use glam::DVec3;
