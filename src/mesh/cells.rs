@@ -575,6 +575,11 @@ impl Cell {
         self.area * self.counts
     }
 
+    /// Counted area that a look at a corner, in the middle of an edge or inside stands for.
+    pub(super) fn per_look(&self) -> f64 {
+        self.counted() / 3.0
+    }
+
     /// Does the cell belong to a face of the hierarchy, and has it any area?
     pub(super) fn is_face(&self) -> bool {
         self.of.1 != NONE && self.area > 0.0

@@ -52,7 +52,7 @@ pub(super) struct MeshGrowth<'a> {
     looked: Vec<Vec<u32>>,
     /// Light lent to covered vertices of each sheet.
     lent: Vec<Lent>,
-    white: [f64; 3],
+    pub(super) white: [f64; 3],
     /// Edges no longer than this are not split.
     smallest: f64,
     /// Vertices at the most.
@@ -105,16 +105,12 @@ impl<'a> MeshGrowth<'a> {
         seen_difference(a, b, self.white)
     }
 
-    pub(super) fn white(&self) -> [f64; 3] {
-        self.white
-    }
-
     /// Asks for looks at the vertices of some cells.
     fn want_corners(&mut self, cells: &[usize]) {
         for &k in cells {
             let cell = &self.cells.all[k];
             let (sheet, vertices) = (cell.sheet as usize, cell.corners.map(|c| c.vertex));
-            let area = cell.counted() / 3.0;
+            let area = cell.per_look();
             for vertex in vertices {
                 self.want(sheet, vertex, area);
             }
@@ -201,10 +197,13 @@ impl<'a> MeshGrowth<'a> {
         })
     }
 
-    /// Variance of a vertex by chance, a multiple of that of a look of the usual effort; 0 without a look.
-    pub(super) fn variance(&self, sheet: usize, vertex: u32) -> f64 {
-        let look = self.look(sheet, vertex);
-        look.map_or(0.0, |look| self.looks.variance(look))
+    /// Variance by chance of what is drawn between three vertices, a multiple of that of a look of the usual effort. Vertices without a look have none.
+    pub(super) fn variance(&self, sheet: usize, vertices: [u32; 3], weights: [f64; 3]) -> f64 {
+        let of = |(&vertex, w): (&u32, f64)| {
+            let look = self.look(sheet, vertex);
+            w * w * look.map_or(0.0, |look| self.looks.variance(look))
+        };
+        vertices.iter().zip(weights).map(of).sum()
     }
 
     fn seen(&self, sheet: usize, vertex: u32) -> Option<[f64; 3]> {
@@ -422,7 +421,7 @@ impl<'a> MeshGrowth<'a> {
         for (&k, (_, _, worst)) in cells.iter().zip(&told) {
             let sheet = self.cells.all[k].sheet as usize;
             let middles = [0, 1, 2].map(|e| self.cells.middle(k, e));
-            let area = self.cells.all[k].counted() / 3.0;
+            let area = self.cells.all[k].per_look();
             let middles = middles.map(|vertex| self.want(sheet, vertex, area));
             let cell = &self.cells.all[k];
             let weights = match worst {
@@ -454,15 +453,13 @@ impl<'a> MeshGrowth<'a> {
         (middles, inside, weights): LookRequest,
     ) -> CellError {
         let Cell { sheet, corners, .. } = &self.cells.all[k];
-        let variance = corners.map(|c| self.variance(*sheet as usize, c.vertex));
+        let vertices = corners.map(|c| c.vertex);
         let off = |look: u32, weights: [f64; 3]| {
             let seen = self.looks.at(look)?.xyz;
             let off = self.difference(mix(&light, weights), seen);
             // A difference that chance alone may cause is not a bend.
-            let corners: f64 = (weights.iter().zip(variance))
-                .map(|(w, variance)| w * w * variance)
-                .sum();
-            let chance = self.noise * (self.looks.variance(look) + corners);
+            let drawn = self.variance(*sheet as usize, vertices, weights);
+            let chance = self.noise * (self.looks.variance(look) + drawn);
             Some((off * off - BY_CHANCE * chance).max(0.0).sqrt())
         };
         let halves = [[0.5, 0.5, 0.0], [0.0, 0.5, 0.5], [0.5, 0.0, 0.5]];

@@ -149,9 +149,7 @@ impl MeshGrowth<'_> {
             let drawn = mix(&light, weights);
             let noise = 0.5 * difference(one, two).powi(2);
             let seen = 0.5 * (difference(drawn, one).powi(2) + difference(drawn, two).powi(2));
-            let of_vertex = |(v, w): (&u32, f64)| w * w * self.variance(sheet, *v);
-            let of_vertices: f64 = corners.iter().zip(weights).map(of_vertex).sum();
-            let square = seen - (1.0 + of_vertices) * noise;
+            let square = seen - (1.0 + self.variance(sheet, corners, weights)) * noise;
             Some(ErrorSample {
                 cell,
                 square,

@@ -49,7 +49,7 @@ impl MeshGrowth<'_> {
                     if self.difference(light[a], light[b]) > self.allowed {
                         let middle = self.cells.middle(k, edge);
                         let cell = &self.cells.all[k];
-                        let (sheet, area) = (cell.sheet as usize, cell.counted() / 3.0);
+                        let (sheet, area) = (cell.sheet as usize, cell.per_look());
                         self.want(sheet, middle, area);
                     }
                 }

@@ -48,7 +48,7 @@ impl MeshGrowth<'_> {
         if self.noise <= 0.0 {
             return own;
         }
-        let white = self.white()[1];
+        let white = self.white[1];
         let error = |(look, own): (u32, &f64)| {
             let usual =
                 self.noise.sqrt() * white / (LIGHTNESS * lightness_sensitivity(own / white));
@@ -132,23 +132,29 @@ fn nearly_straight(hinges: &[Hinge], seen: &[f64], errors: &[f64]) -> Vec<f64> {
     for _ in 0..TURNS {
         let trust = |hinge: &Hinge| STRAIGHT / (1.0 + hinge.bend(&light).powi(2)).powi(2);
         let trusts: Vec<f64> = hinges.iter().map(trust).collect();
-        settle(hinges, &trusts, seen, errors, &mut light);
+        conjugate_gradients(hinges, &trusts, seen, errors, &mut light);
     }
     light
 }
 
-/// Conjugate gradients for `sum ((light - seen) / error)^2 + sum trust bend^2`, in units of errors.
-fn settle(hinges: &[Hinge], trusts: &[f64], seen: &[f64], errors: &[f64], light: &mut [f64]) {
+/// Brings light to the least of `sum ((light - seen) / error)^2 + sum trust bend^2`, or near to it.
+fn conjugate_gradients(
+    hinges: &[Hinge],
+    trusts: &[f64],
+    seen: &[f64],
+    errors: &[f64],
+    light: &mut [f64],
+) {
     let n = seen.len();
     let mut out = vec![0.0; n];
     let mut scale: Vec<f64> = errors
         .iter()
         .map(|e| if *e > 0.0 { 1.0 / (e * e) } else { 1.0 })
         .collect();
-    let own = scale.clone();
+    let weights = scale.clone();
     let times = |x: &[f64], out: &mut [f64]| {
-        for ((out, x), own) in out.iter_mut().zip(x).zip(&own) {
-            *out = own * x;
+        for ((out, x), weight) in out.iter_mut().zip(x).zip(&weights) {
+            *out = weight * x;
         }
         for (hinge, trust) in hinges.iter().zip(trusts) {
             let bend = trust * hinge.bend(x);
@@ -163,7 +169,7 @@ fn settle(hinges: &[Hinge], trusts: &[f64], seen: &[f64], errors: &[f64], light:
         }
     }
     times(light, &mut out);
-    let mut left: Vec<f64> = (0..n).map(|k| own[k] * seen[k] - out[k]).collect();
+    let mut left: Vec<f64> = (0..n).map(|k| weights[k] * seen[k] - out[k]).collect();
     let mut ahead: Vec<f64> = left.iter().zip(&scale).map(|(r, s)| r / s).collect();
     let mut size: f64 = left.iter().zip(&ahead).map(|(r, z)| r * z).sum();
     let enough = FOUND * size;

@@ -4,7 +4,7 @@
 //! together cost least where n goes with the area that each stands for to the power 2/5. Half of the vertices of a furnished room lie on a
 //! hundredth of its surface (garage .8 %, home theatre 1.2, living room 3.1): to the same error all of them together take a third of the samples.
 
-/// The error of a look falls with this power of the number of its samples, see [`Hemisphere`](crate::transport::Hemisphere).
+/// The error of a look falls with this power of the number of its samples, see [`Hemisphere`](crate::transport::hemisphere::Hemisphere).
 const POWER: f64 = 0.75;
 /// The number of samples goes with this power of the area.
 const SHARE: f64 = 1.0 / (1.0 + 2.0 * POWER);
