@@ -44,9 +44,20 @@ fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
     }
 }
 
+/// Where the tests at the end of a file begin, whoever may use them.
+fn tests_begin(text: &str) -> usize {
+    let mark = "#[cfg(test)]\n";
+    let module = |at: &usize| {
+        let line = text[at + mark.len()..].lines().next();
+        line.is_some_and(|line| line.ends_with("mod tests {"))
+    };
+    let mut marks = text.match_indices(mark).map(|(at, _)| at);
+    marks.find(module).unwrap_or(text.len())
+}
+
 /// Code without comments and without the tests at its end, which may look at anything.
 fn code(text: &str) -> String {
-    let end = text.find("#[cfg(test)]\nmod tests {").unwrap_or(text.len());
+    let end = tests_begin(text);
     let lines = text[..end].lines();
     lines
         .map(|line| line.split("//").next().unwrap_or("").to_owned() + "\n")
@@ -98,7 +109,7 @@ fn files_can_be_read() {
 /// Names and lengths of the functions of a file, tests aside. Each ends at the brace below its first column: the code is
 /// formatted.
 fn functions(text: &str) -> Vec<(String, usize)> {
-    let end = text.find("#[cfg(test)]\nmod tests {").unwrap_or(text.len());
+    let end = tests_begin(text);
     let lines: Vec<&str> = text[..end].lines().collect();
     let mut found = Vec::new();
     for (at, line) in lines.iter().enumerate() {

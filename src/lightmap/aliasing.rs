@@ -54,6 +54,8 @@ impl LightmapGrowth<'_> {
             .finest
             .map(|level| 1_i64 << (DEPTH - u32::from(level) - 1));
         let texel = lattice.at(half.map(|h| 2 * h as u32));
+        // There are four such places to a texel.
+        let area = 0.25 * texel.element_product();
         let mut parts = Vec::with_capacity(9);
         for dy in -1..=1_i64 {
             for dx in -1..=1_i64 {
@@ -63,9 +65,8 @@ impl LightmapGrowth<'_> {
                     continue;
                 }
                 let place = place.map(|p| p as u32);
-                let sample =
-                    self.sampler
-                        .want(number, &self.charts[number as usize], &lattice, place);
+                let chart = (number, &self.charts[number as usize]);
+                let sample = self.sampler.want(chart, &lattice, place, area);
                 let moved = (sample.at - lattice.at(place)) / texel;
                 if moved.length() <= MOVED || (dx == 0 && dy == 0) {
                     let weight = 0.25 / f64::from(1_u32 << (dx.abs() + dy.abs()));

@@ -64,6 +64,7 @@ impl Bake {
             GatherQuality::Vertex(Effort::default()),
             limits.late,
         );
+        looks.apart = true;
         looks.indirect = limits.indirect;
         let more = AT / self.settings().error;
         let budget = Budget {
@@ -88,11 +89,13 @@ impl Bake {
         loop {
             let end = growth.grow(turns.aim, progress);
             let points = growth.points(self, turns.turn, progress);
+            growth.even_out();
             let samples = growth.compared(&points, &self.placed(&growth, &Vec::new(), None).0);
             let found = summed(&samples, allowed, None);
             let ended = (end, (limits.late)());
             if turns.is_over(found, growth.cells.len(), ended, growth.sum()) {
                 let smoothed = growth.smooth(allowed, progress);
+                growth.even_out();
                 let (mut placed, covered) = self.placed(&growth, &smoothed, None);
                 close(self, &growth.charts, &spaces, &mut placed);
                 let samples = growth.compared(&points, &placed);
@@ -173,16 +176,22 @@ impl Bake {
         part: Option<NumberedLayer>,
         sample: &LatticeSample,
     ) -> Option<Texel> {
-        let seen = growth.sampler.looks.at(sample.look)?;
+        let factor = growth.factors.get(sample.look as usize).unwrap_or(&1.0);
+        let row = growth
+            .sampler
+            .looks
+            .at(sample.look)?
+            .row
+            .map(|x| factor * x);
         if let Some((k, lanes)) = part {
-            let shown = (&sample.vertex, chart.back, &*seen.row);
-            let irradiance = self.lanes().tristimulus(&lanes.of(&*seen.row));
+            let shown = (&sample.vertex, chart.back, &row);
+            let irradiance = self.lanes().tristimulus(&lanes.of(&row));
             return Some(Texel {
                 irradiance: irradiance.map(|x| x as f32),
                 light: self.layer(k, lanes, shown, look),
             });
         }
-        let vertex = self.vertex(&sample.vertex, chart.back, &seen.row, look);
+        let vertex = self.vertex(&sample.vertex, chart.back, &row, look);
         Some(Texel {
             irradiance: vertex.irradiance,
             light: vertex.light,

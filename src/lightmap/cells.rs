@@ -124,6 +124,11 @@ impl ChartCell {
         self.area * self.counts
     }
 
+    /// Counted area that a look at a corner, in the middle of an edge or inside stands for.
+    pub(super) fn per_look(&self) -> f64 {
+        self.counted() / 4.0
+    }
+
     /// Area of the chart in the cell, the triangles that have some of it, and the middle of the largest part.
     pub(super) fn clip(&mut self, chart: &Chart, lattice: &Lattice) -> DVec2 {
         let [low, high] = [self.point([0, 0]), self.point([2, 2])].map(|p| lattice.at(p));

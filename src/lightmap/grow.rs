@@ -19,8 +19,6 @@ use glam::DVec2;
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
-/// Variance by chance of the difference between a look and the mean of two, in variances of a look.
-const LINE: f64 = 1.5;
 /// Cells are no longer than this share of the room's half diagonal at the beginning, so that what no leaf tells of is found.
 const LONGEST: f64 = 0.125;
 /// Charts smaller than this share of the room's half diagonal are one texel, until that proves wrong.
@@ -61,11 +59,13 @@ pub(super) struct LightmapGrowth<'a> {
     hints_at: Vec<Vec<DVec2>>,
     /// Light lent to covered corners of cells.
     lent: HashMap<TexelKey, [f64; 3]>,
-    white: [f64; 3],
+    pub(super) white: [f64; 3],
     /// Mean square of a cell until something is known of it.
     pub(super) unknown: f64,
-    /// Variance of a look, by chance.
+    /// Variance of a look of the usual effort, by chance.
     pub(super) noise: f64,
+    /// What the light of looks is multiplied by where it is shown, so that what they differ by through chance is evened out.
+    pub(super) factors: Vec<f32>,
 }
 
 impl<'a> LightmapGrowth<'a> {
@@ -88,6 +88,7 @@ impl<'a> LightmapGrowth<'a> {
             white: bake.light().white,
             unknown: 0.0,
             noise: 0.0,
+            factors: Vec::new(),
             charts: Vec::new(),
         };
         for (k, chart) in charts.iter().enumerate() {
@@ -115,10 +116,24 @@ impl<'a> LightmapGrowth<'a> {
     }
 
     fn want(&mut self, cell: usize, point: [u32; 2]) -> LatticeSample {
-        let chart = self.cells[cell].chart;
-        let k = chart as usize;
+        let (cell, chart) = (&self.cells[cell], self.cells[cell].chart);
+        let (k, area) = (chart as usize, cell.per_look());
         self.sampler
-            .want(chart, &self.charts[k], &self.lattices[k], point)
+            .want((chart, &self.charts[k]), &self.lattices[k], point, area)
+    }
+
+    /// Variance of the light drawn at a place of a cell, by chance, in variances of a look of the usual effort.
+    pub(super) fn variance(&self, cell: &ChartCell, share: DVec2) -> f64 {
+        let lattice = &self.lattices[cell.chart as usize];
+        let weights = match lattice.single {
+            true => [1.0, 0.0, 0.0, 0.0],
+            false => bilinear(share),
+        };
+        let corner = |(point, w): ([u32; 2], f64)| {
+            let sample = self.sampler.known(cell.chart, lattice, point);
+            w * w * sample.map_or(0.0, |sample| self.sampler.looks.variance(sample.look))
+        };
+        cell.corners().into_iter().zip(weights).map(corner).sum()
     }
 
     /// What was seen at a corner of a cell.
@@ -345,8 +360,9 @@ impl<'a> LightmapGrowth<'a> {
             if lattice.single {
                 // Corners of the rectangle, or what of the chart is nearest to them.
                 let places = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]];
-                let samples =
-                    places.map(|at| self.sampler.want_at(chart, DVec2::from(at) * chart.size));
+                let area = self.cells[k].per_look();
+                let places = places.map(|at| DVec2::from(at) * chart.size);
+                let samples = places.map(|at| self.sampler.want_at(chart, at, area));
                 asked.push((samples.to_vec(), None, 0.0));
                 continue;
             }
@@ -363,7 +379,8 @@ impl<'a> LightmapGrowth<'a> {
                 None if few => Some((self.cells[k].clone().clip(chart, lattice), 0.0)),
                 None => None,
             };
-            let inside = inside.map(|(at, most)| (self.sampler.want_at(chart, at), most));
+            let area = cell.per_look();
+            let inside = inside.map(|(at, most)| (self.sampler.want_at(chart, at, area), most));
             asked.push((middles.to_vec(), inside, told));
         }
         self.sampler.looks.complete(progress);
@@ -397,7 +414,8 @@ impl<'a> LightmapGrowth<'a> {
             }
             let off = self.difference(mix(&light, share), self.sampler.seen(sample)?);
             // What chance alone may do is no bend.
-            let chance = LINE * self.noise;
+            let own = self.sampler.looks.variance(sample.look);
+            let chance = self.noise * (own + self.variance(cell, share));
             Some((off * off - BY_CHANCE * chance).max(0.0).sqrt())
         };
         let seen: Vec<Option<f64>> = middles.iter().map(off).collect();
@@ -509,12 +527,13 @@ pub(super) mod tests {
     pub(in crate::lightmap) fn begun(bake: &Bake) -> LightmapGrowth<'_> {
         let spaces = bake.spaces();
         let all = charts(bake.scene(), bake.mesh(), bake.tree(), &spaces, &Conformal);
-        let looks = Looks::new(
+        let mut looks = Looks::new(
             bake,
             spaces,
             GatherQuality::Vertex(Effort::default()),
             &|| false,
         );
+        looks.apart = true;
         let budget = Budget {
             looks: 100_000,
             texels: 100_000,

@@ -2,7 +2,6 @@
 //!
 //! As between vertices (`mesh::measure`): every point is looked at twice, and what looks differ by chance is taken off.
 
-use super::cells::bilinear;
 use super::grow::LightmapGrowth;
 use super::maps::PlacedCharts;
 use super::sampler::LatticeSample as Place;
@@ -101,17 +100,14 @@ impl LightmapGrowth<'_> {
         points.iter().enumerate().filter_map(sample).collect()
     }
 
-    /// Sum of squares of the weights of the looks that a point's light is interpolated from.
+    /// Variance of the light that is drawn at a point, by chance, in variances of a look of the usual effort.
     fn shared(&self, point: &TestPoint, cells: &[Vec<usize>]) -> f64 {
         let of_cell = |k: usize| {
             let cell = &self.cells[k];
             let share = cell.share(&self.lattices[point.chart], point.place.at);
-            bilinear(share).map(|w| w * w).iter().sum::<f64>()
+            self.variance(cell, share)
         };
-        match self.lattices[point.chart].single {
-            true => 1.0,
-            false => self.cell_at(point, cells).map_or(1.0, of_cell),
-        }
+        self.cell_at(point, cells).map_or(1.0, of_cell)
     }
 
     /// Cells of each chart.

@@ -9,6 +9,7 @@ mod cells;
 mod charts;
 mod finder;
 mod grow;
+mod hinges;
 mod layers;
 mod maps;
 mod measure;

@@ -31,34 +31,36 @@ impl<'a> Sampler<'a> {
         }
     }
 
-    /// Asks for a place of a chart's lattice; it is looked at when the looks are completed.
+    /// Asks for a place of a chart's lattice that is to stand for that area besides what it stood for before; it is looked at when the looks are completed.
     pub(super) fn want(
         &mut self,
-        number: u32,
-        chart: &Chart,
+        (number, chart): (u32, &Chart),
         lattice: &Lattice,
         point: [u32; 2],
+        area: f64,
     ) -> LatticeSample {
         let point = if lattice.single { [u32::MAX; 2] } else { point };
         if let Some(sample) = self.known.get(&(number, point)) {
+            self.looks.stand_for(sample.look, area);
             return *sample;
         }
         let at = match lattice.single {
             true => 0.5 * chart.size,
             false => lattice.at(point),
         };
-        let sample = self.want_at(chart, at);
+        let sample = self.want_at(chart, at, area);
         self.known.insert((number, point), sample);
         sample
     }
 
     /// Asks for any place.
-    pub(super) fn want_at(&mut self, chart: &Chart, at: DVec2) -> LatticeSample {
+    pub(super) fn want_at(&mut self, chart: &Chart, at: DVec2, area: f64) -> LatticeSample {
         // A chart has a triangle at least, and that a nearest place.
         let (facet, weights, _) = chart.finder.nearest(&chart.flat, at).unwrap_or_default();
         let vertex = chart.vertex(facet, weights);
         let at = chart.at(facet, vertex.weights);
         let look = self.looks.want_texel(&vertex, chart.surface, chart.back);
+        self.looks.stand_for(look, area);
         LatticeSample { look, at, vertex }
     }
 

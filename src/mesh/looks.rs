@@ -315,10 +315,31 @@ fn less(mut all: [f32; 64], direct: &[f32; 64]) -> [f32; 64] {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
+    use crate::color::seen_difference;
     use crate::transport::tests::baked;
     use std::collections::HashSet;
+
+    /// How far the light of looks, as they saw it and with these factors, is from that of closer looks at the same places: mean squares of the colour
+    /// difference at some 2,000 of them.
+    pub(crate) fn off(looks: &Looks, factor: impl Fn(u32) -> f64) -> [f64; 2] {
+        let step = looks.len() / 2000 + 1;
+        let some = (0..looks.len() as u32).step_by(step);
+        let some: Vec<u32> = some.filter(|&look| looks.at(look).is_some()).collect();
+        let places: Vec<Receiver> = some.iter().map(|&k| looks.places[k as usize].0).collect();
+        let mut sums = [0.0; 2];
+        for (&look, closer) in some.iter().zip(looks.bake.gather(&places)) {
+            let truth = looks.bake.lanes().tristimulus(&closer.irradiance);
+            let own = looks.at(look).unwrap().xyz;
+            let other = own.map(|x| factor(look) * x);
+            for (sum, light) in sums.iter_mut().zip([own, other]) {
+                let off = seen_difference(light, truth, looks.bake.light().white);
+                *sum += off * off / some.len() as f64;
+            }
+        }
+        sums
+    }
 
     /// But for those of a picture on the way.
     #[test]

@@ -11,6 +11,7 @@ mod fences;
 mod fit;
 mod flip;
 mod grow;
+mod hinges;
 pub(crate) mod hints;
 mod lines;
 pub(crate) mod looks;
@@ -23,7 +24,7 @@ mod shades;
 mod shadow;
 mod sides;
 mod skins;
-mod smooth;
+pub(crate) mod smooth;
 pub(crate) mod turns;
 mod write;
 
