@@ -64,7 +64,6 @@ impl Bake {
             GatherQuality::Vertex(Effort::default()),
             limits.late,
         );
-        looks.apart = true;
         looks.indirect = limits.indirect;
         let more = AT / self.settings().error;
         let budget = Budget {

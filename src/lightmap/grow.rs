@@ -527,13 +527,12 @@ pub(super) mod tests {
     pub(in crate::lightmap) fn begun(bake: &Bake) -> LightmapGrowth<'_> {
         let spaces = bake.spaces();
         let all = charts(bake.scene(), bake.mesh(), bake.tree(), &spaces, &Conformal);
-        let mut looks = Looks::new(
+        let looks = Looks::new(
             bake,
             spaces,
             GatherQuality::Vertex(Effort::default()),
             &|| false,
         );
-        looks.apart = true;
         let budget = Budget {
             looks: 100_000,
             texels: 100_000,

@@ -41,8 +41,9 @@ type LookKey = ([i64; 6], (u32, bool), bool, Option<u32>);
 pub(crate) struct Looks<'a> {
     bake: &'a Bake,
     quality: GatherQuality,
-    /// Has each look rays of its own, so that looks err independently? Else neighbours err alike.
-    pub(crate) apart: bool,
+    /// Has each look rays of its own, so that looks err independently? Else neighbours err alike: in pictures on the way, which have few rays, and where what they
+    /// differ by is not evened out.
+    apart: bool,
     /// The area that is worth the usual effort.
     typical: f64,
     /// Is it time to end?
@@ -75,7 +76,7 @@ impl<'a> Looks<'a> {
         Self {
             bake,
             quality,
-            apart: false,
+            apart: quality != GatherQuality::Preview,
             typical: typical(leaves.map(|&leaf| bake.tree().node(leaf).counted)),
             late,
             patient: false,

@@ -197,9 +197,7 @@ impl Bake {
         let spaces = self.spaces();
         let mut cells = Cells::new(self.scene(), self.mesh(), self.tree(), &spaces);
         hints::give(self, &mut cells);
-        let mut looks = Looks::new(self, spaces, quality, late);
-        // Pictures on the way have few rays, and what they differ by is not evened out.
-        looks.apart = quality != GatherQuality::Preview;
+        let looks = Looks::new(self, spaces, quality, late);
         MeshGrowth::new(
             cells,
             looks,

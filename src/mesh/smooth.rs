@@ -10,7 +10,7 @@ use crate::light::lightness_sensitivity;
 
 /// Lightness changes by so many CIE units when a brightness near that of white changes by all of it: the derivative of `116 h^(1/3)`.
 const LIGHTNESS: f64 = 116.0 / 3.0;
-/// Weight of a hinge beside that of a look. With none, 4 and 16 files at `--error 1` are off by .76, .72 and .69 dE00 in a garage and by 1.01, 1.00 and 1.00 in a
+/// Weight of a hinge beside that of a look. With none, 4 and 16 files at `--error 1` are off by .76, .71 and .69 dE00 in a garage and by 1.01, .99 and 1.00 in a
 /// living room; between the vertices of a furnished room light is off by .350, .355 and .399. What a look errs by differs from place to place: half of the looks err by
 /// two fifths of what all do in the mean square, and with 16 their light was drawn too straight (vertices of the furnished room .42 off for .28, with 4 .30).
 const STRAIGHT: f64 = 4.0;
