@@ -1,6 +1,5 @@
 //! Hinges of a map: three places of a lattice in a row, see [`evened`].
 
-use super::cells::ChartCell;
 use super::grow::LightmapGrowth;
 use crate::mesh::smooth::{Hinge, evened};
 use rayon::prelude::*;
@@ -26,14 +25,10 @@ impl LightmapGrowth<'_> {
         self.factors = (0..).zip(light).map(factor).collect();
     }
 
-    /// LatticeRows of three looks on all charts.
+    /// Three looks in a row, on all charts.
     fn hinges(&self, errors: &[f64]) -> Vec<Hinge> {
-        let mut charts: BTreeMap<u32, Vec<&ChartCell>> = BTreeMap::new();
-        for cell in &self.cells {
-            charts.entry(cell.chart).or_default().push(cell);
-        }
-        let of_chart = |(&chart, cells): (&u32, &Vec<&ChartCell>)| {
-            let mut hinges = Vec::new();
+        let of_chart = |(chart, cells): (usize, &Vec<usize>)| {
+            let (chart, mut hinges) = (chart as u32, Vec::new());
             for ((axis, at), beside) in self.rows(cells) {
                 let looks = [beside[0], beside[1], Some(at)].map(|p| self.unmoved(chart, p?));
                 let ([Some(low), Some(high)], [Some(a), Some(b), Some(own)]) = (beside, looks)
@@ -47,13 +42,15 @@ impl LightmapGrowth<'_> {
             }
             hinges
         };
-        charts.par_iter().flat_map_iter(of_chart).collect()
+        let charts = self.by_chart();
+        let charts = charts.par_iter().enumerate();
+        charts.flat_map_iter(of_chart).collect()
     }
 
     /// The nearest places beside each that was looked at, along edges of cells and through their middles.
-    fn rows(&self, cells: &[&ChartCell]) -> LatticeRows {
+    fn rows(&self, cells: &[usize]) -> LatticeRows {
         let mut rows = LatticeRows::new();
-        for cell in cells {
+        for cell in cells.iter().map(|&k| &self.cells[k]) {
             for (axis, across) in [0, 1]
                 .into_iter()
                 .flat_map(|axis| [0, 1, 2].map(|a| (axis, a)))

@@ -111,7 +111,7 @@ impl LightmapGrowth<'_> {
     }
 
     /// Cells of each chart.
-    fn by_chart(&self) -> Vec<Vec<usize>> {
+    pub(super) fn by_chart(&self) -> Vec<Vec<usize>> {
         let mut cells = vec![Vec::new(); self.charts.len()];
         for (k, cell) in self.cells.iter().enumerate() {
             cells[cell.chart as usize].push(k);

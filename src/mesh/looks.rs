@@ -41,9 +41,6 @@ type LookKey = ([i64; 6], (u32, bool), bool, Option<u32>);
 pub(crate) struct Looks<'a> {
     bake: &'a Bake,
     quality: GatherQuality,
-    /// Has each look rays of its own, so that looks err independently? Else neighbours err alike: in pictures on the way, which have few rays, and where what they
-    /// differ by is not evened out.
-    apart: bool,
     /// The area that is worth the usual effort.
     typical: f64,
     /// Is it time to end?
@@ -76,7 +73,6 @@ impl<'a> Looks<'a> {
         Self {
             bake,
             quality,
-            apart: quality != GatherQuality::Preview,
             typical: typical(leaves.map(|&leaf| bake.tree().node(leaf).counted)),
             late,
             patient: false,
@@ -123,9 +119,11 @@ impl<'a> Looks<'a> {
             return *look;
         }
         let look = places.len() as u32;
-        let seed = match self.apart {
-            true => hash(u64::from(look), SEED ^ self.bake.settings().seed),
-            false => to.seed,
+        // Looks have rays of their own, so that they err independently. In pictures on the way, which have few rays, and where what they differ by is not evened
+        // out, neighbours err alike.
+        let seed = match self.quality {
+            GatherQuality::Preview => to.seed,
+            _ => hash(u64::from(look), SEED ^ self.bake.settings().seed),
         };
         places.push((Receiver { seed, ..to }, believing));
         self.areas.push(0.0);
