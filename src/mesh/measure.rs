@@ -69,7 +69,8 @@ impl MeshGrowth<'_> {
         turn: u64,
         progress: &dyn Fn(usize, usize),
     ) -> Vec<ErrorSample> {
-        let count = match self.looks.is_late() {
+        // The first only tells how much looks err by chance.
+        let count = match self.looks.is_late() || turn == 0 {
             true => POINTS[0],
             false => (self.looks.len() / SHARE).clamp(POINTS[0], POINTS[1]),
         };

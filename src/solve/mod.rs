@@ -38,7 +38,7 @@ mod refinement;
 mod reflection;
 mod representation;
 mod room;
-mod solution;
+pub(crate) mod solution;
 pub(crate) mod solver;
 mod solving;
 mod sources;

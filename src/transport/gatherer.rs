@@ -49,21 +49,24 @@ pub(crate) struct AllowedNoise {
     pub(crate) lamps: f64,
     /// Rays to all lamps, or all bright patches, together.
     pub(crate) most_rays: usize,
+    /// The light that one ray of the hemisphere brings: brighter patches are gathered by their links.
+    pub(crate) glare: f64,
     /// Rays to the openings to a sky, at the least and at the most.
     pub(crate) opening_rays: [usize; 2],
     /// What is met close by, see `transport::nearby`.
     pub(crate) nearby: f64,
-    /// Turns of paths from there.
-    pub(crate) most_turns: f64,
+    /// Paths from there, at the least and at the most.
+    pub(crate) paths: [usize; 2],
 }
 
 impl AllowedNoise {
     /// With so many times the samples.
     pub(crate) fn by(self, samples: f64) -> Self {
         let times = |n: usize| ((n as f64 * samples) as usize).max(1);
+        let [least, most] = self.paths;
         Self {
             most_rays: times(self.most_rays),
-            most_turns: (self.most_turns * samples).max(1.0),
+            paths: [least, times(most).max(least)],
             ..self
         }
     }

@@ -32,11 +32,11 @@ struct LightPath {
     sample: u32,
     /// The point that the path has reached, while it goes on.
     end: Option<Receiver>,
-    /// Share of the light there that gets back to the start.
+    /// Share of the light there that gets back to the start, times what the path weighs.
     through: f64,
     /// Light that got back to the start.
     sum: f64,
-    /// Reflected brightness of the leaf at the start.
+    /// Reflected brightness of the leaf at the start, times what the path weighs.
     leaf: f64,
 }
 
@@ -57,45 +57,44 @@ impl Gatherer<'_> {
         memory: &mut Memory,
     ) -> f64 {
         let bright = |hit: &(u32, Hit)| f64::from(self.light.bright_reflected[hit.0 as usize]);
-        let carries = share * hits.iter().map(bright).sum::<f64>();
+        let light: Vec<f64> = hits.iter().map(bright).collect();
+        let carries = share * light.iter().sum::<f64>();
         let worth = carries / (self.allowed_noise.nearby * self.tolerance_at(to, carries));
-        let turns = (worth * worth / FOLLOWED as f64)
-            .ceil()
-            .clamp(1.0, self.allowed_noise.most_turns);
+        let [least, most] = self.allowed_noise.paths;
+        let paths = ((worth * worth).ceil() as usize).clamp(least, most);
+        let count = paths.min(FOLLOWED).min(hits.len());
         let mut pairs = Vec::new();
-        for turn in 0..turns as u32 {
-            self.paths_back(hits, (to.seed, turn), backs, memory, &mut pairs);
+        for turn in 0..paths.div_ceil(FOLLOWED) as u32 {
+            // Other hits in every turn, as far as there are others.
+            let some = chosen(&light, count, sequence02(turn, 0)[0]);
+            let some = some.map(|(k, weight)| (hits[k], weight, weight * light[k]));
+            self.paths_back(some, (to.seed, turn), backs, memory, &mut pairs);
         }
         believed(&pairs)
     }
 
-    /// Follows some of the rays that met something close by. Light that comes back, and that of the leaves, is added to the `pairs`.
+    /// Follows some of the rays that met something close by, each with its weight and with the light of its leaf times that. Light that comes back, and that of the
+    /// leaves, is added to the `pairs`.
     fn paths_back(
         &self,
-        hits: &[(u32, Hit)],
+        hits: impl Iterator<Item = ((u32, Hit), f64, f64)>,
         (seed, turn): (u64, u32),
         backs: f64,
         memory: &mut Memory,
         pairs: &mut Vec<[f64; 2]>,
     ) {
-        let count = hits.len().min(FOLLOWED);
-        // Other hits in every turn, as far as there are others.
-        let first = sequence02(turn, 0)[0];
-        let mut paths: Vec<LightPath> = (0..count)
-            .map(|k| {
-                let at = (k as f64 + first) / count as f64;
-                let (leaf, hit) = hits[(at * hits.len() as f64) as usize];
-                let mut path = LightPath {
-                    sample: turn * FOLLOWED as u32 + k as u32,
-                    end: None,
-                    through: 1.0,
-                    sum: 0.0,
-                    leaf: f64::from(self.light.bright_reflected[leaf as usize]),
-                };
-                self.set_out(&mut path, leaf, &hit, hash(!seed, 0));
-                path
-            })
-            .collect();
+        let path = |(sample, ((leaf, hit), weight, bright))| {
+            let mut path = LightPath {
+                sample,
+                end: None,
+                through: weight,
+                sum: 0.0,
+                leaf: bright,
+            };
+            self.set_out(&mut path, leaf, &hit, hash(!seed, 0));
+            path
+        };
+        let mut paths: Vec<LightPath> = (turn * FOLLOWED as u32..).zip(hits).map(path).collect();
         // All paths advance one step at a time: rays from neighbouring places go together.
         for step in 0..STEPS {
             let samples = |dimension: u64| hash(seed, 2 * step + dimension);
@@ -218,6 +217,25 @@ impl Gatherer<'_> {
     }
 }
 
+/// Some of what is close by, half of them evenly and half by their light, and what each then weighs: if all were chosen evenly, a few dark ones could stand for bright
+/// ones with a path that meets a lamp. All of them, once, where that many are asked for.
+fn chosen(light: &[f64], count: usize, first: f64) -> impl Iterator<Item = (usize, f64)> {
+    let mean = light.iter().sum::<f64>() / light.len() as f64;
+    let part = move |k: usize| match count < light.len() && mean > 0.0 {
+        true => 0.5 * (light[k] / mean + 1.0),
+        false => 1.0,
+    };
+    let (mut k, mut upto) = (0, 0.0);
+    (0..count).map(move |n| {
+        let at = (n as f64 + first) / count as f64 * light.len() as f64;
+        while upto + part(k) <= at && k + 1 < light.len() {
+            upto += part(k);
+            k += 1;
+        }
+        (k, 1.0 / part(k))
+    })
+}
+
 /// Sum of the first numbers of all pairs as a share of the second, as far as it exceeds its noise (Stein's positive
 /// part).
 fn believed(pairs: &[[f64; 2]]) -> f64 {
@@ -239,26 +257,40 @@ fn believed(pairs: &[[f64; 2]]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::solve::{Effort, GatherQuality};
+    use crate::solve::solution::{NOISE_AT_POINT, NOISE_AT_VERTEX};
     use crate::transport::MOSTLY;
+    use crate::transport::gatherer::AllowedNoise;
+    use crate::transport::receiver::Gathered;
     use crate::transport::tests::{baked, middle};
 
-    /// A vertex casts the same rays but for fewer paths.
+    /// With the rest alike, a vertex follows fewer.
     #[test]
     fn points_follow_more_paths_than_vertices() {
         let bake = baked("furnished.glb", 2);
         let leaves = bake.tree().leaves().step_by(17);
         let places: Vec<Receiver> = leaves.map(|leaf| middle(bake.tree(), leaf)).collect();
-        let points = bake.gather_with(&places, GatherQuality::Full);
-        let vertices = bake.gather_with(&places, GatherQuality::Vertex(Effort::default()));
-        let both = points.iter().zip(&vertices);
-        let (mut more, mut fewer) = (0, 0);
-        // What lies inside something is not gathered at a vertex.
-        for (point, vertex) in both.filter(|(_, vertex)| vertex.backs <= MOSTLY) {
-            more += usize::from(point.rays > vertex.rays);
-            fewer += usize::from(point.rays < vertex.rays);
-        }
-        assert!(more > 40 && fewer == 0, "{more} {fewer}");
+        bake.room.with_sight(|sight| {
+            let at = |AllowedNoise { nearby, paths, .. }: AllowedNoise| -> Vec<Gathered> {
+                let gatherer = Gatherer {
+                    allowed_noise: AllowedNoise {
+                        nearby,
+                        paths,
+                        ..NOISE_AT_POINT
+                    },
+                    ..bake.gatherer(sight)
+                };
+                let memory = &mut Memory::default();
+                places.iter().map(|to| gatherer.at(to, memory)).collect()
+            };
+            let (points, vertices) = (at(NOISE_AT_POINT), at(NOISE_AT_VERTEX));
+            let (mut more, mut fewer) = (0, 0);
+            // What lies inside something is not gathered at a vertex.
+            for (point, vertex) in points.iter().zip(&vertices).filter(|p| p.1.backs <= MOSTLY) {
+                more += usize::from(point.rays > vertex.rays);
+                fewer += usize::from(point.rays < vertex.rays);
+            }
+            assert!(more > 40 && fewer == 0, "{more} {fewer}");
+        });
     }
 
     /// As rays over the hemisphere do: twice the light of leaves that are twice as bright there, none of those that are black.
@@ -291,6 +323,30 @@ mod tests {
         let [none, even, twice] = [-1.0, 0.0, 1.0].map(arrived);
         assert!(even > 1.5 * none, "{even} {none}");
         assert!((twice - none - 2.0 * (even - none)).abs() < 1e-6 * twice);
+    }
+
+    /// Bright ones more often, none never, and what all bring is right in the mean.
+    #[test]
+    fn some_of_what_is_close_by_stand_for_all() {
+        let light: Vec<f64> = (0..100).map(|k| f64::from(u8::from(k % 10 == 0))).collect();
+        let (mut sum, mut bright, mut least) = ([0.0; 2], 0, f64::INFINITY);
+        for turn in 0..1000 {
+            let mut all = 0.0;
+            for (k, weight) in chosen(&light, 8, sequence02(turn, 0)[0]) {
+                sum = [sum[0] + weight, sum[1] + weight * light[k]];
+                bright += usize::from(light[k] > 0.0);
+                all += weight * light[k];
+            }
+            least = f64::min(least, all);
+        }
+        // Eight of a hundred, of which ten bring 1; 11 of 20 choices are bright.
+        assert!((sum[0] / 8000.0 - 1.0).abs() < 0.01, "{sum:?}");
+        assert!((sum[1] / 800.0 - 1.0).abs() < 0.01, "{sum:?}");
+        assert!((4300..4500).contains(&bright), "{bright}");
+        assert!(least > 0.4, "{least}");
+        let all: Vec<_> = chosen(&light, 100, 0.7).collect();
+        assert_eq!(all, (0..100).map(|k| (k, 1.0)).collect::<Vec<_>>());
+        assert!(chosen(&[0.0; 9], 3, 0.5).all(|(_, weight)| weight == 1.0));
     }
 
     #[test]

@@ -11,11 +11,6 @@ use crate::light::{Passage, Place, accumulate};
 use crate::link::{POLYGONS, pattern};
 use glam::{DVec3, Vec3};
 
-/// A patch so bright that one ray of the hemisphere would carry more than this many tolerances is gathered by its link. With 4, 2, 1, .5 and .25
-/// half of 2,500 points of the file are off by more than .449, .444, .419, .439, .468 dE00 in a garage and .444, .408, .386, .374, .397 in a living
-/// room (grey, `--error 1`); the last takes 10 % more time.
-const GLARE: f64 = 1.0;
-
 impl Gatherer<'_> {
     /// Gathers at a point.
     pub(super) fn sweep(
@@ -45,7 +40,7 @@ impl Gatherer<'_> {
         self.lamps_of(to, memory, out);
         self.lamps_in_mirrors(to, memory, out);
         // No ray may carry more than this.
-        let most = GLARE * self.tolerance_at(to, 1.0);
+        let most = self.allowed_noise.glare * self.tolerance_at(to, 1.0);
         self.bright(to, most * hemisphere.len() as f64, memory, out);
         for (x, d) in out.irradiance.iter_mut().zip(&out.direct) {
             *x += d;
@@ -322,10 +317,12 @@ mod tests {
             };
             let fine = with(bake.gatherer(sight).tolerance / 8.0);
             let (many, few) = (with(1e-9), with(f64::INFINITY));
+            let mut fewest = with(f64::INFINITY);
+            fewest.allowed_noise.paths[0] /= 8;
             let hemisphere = fine.hemisphere.unwrap();
             let share = 1.0 / hemisphere.len() as f64;
             let mut memory = Memory::default();
-            let (mut places, mut off) = (0, [0.0; 2]);
+            let (mut places, mut off, mut rays) = (0, [0.0; 2], [0; 2]);
             for leaf in bake.tree().leaves().step_by(17) {
                 let to = middle(bake.tree(), leaf);
                 let mut met = Vec::new();
@@ -335,6 +332,11 @@ mod tests {
                 met.retain(|(leaf, hit)| fine.is_near(*leaf, hit, how.1));
                 if met.len() < 64 {
                     continue;
+                }
+                for (rays, gatherer) in rays.iter_mut().zip([&few, &fewest]) {
+                    let before = memory.rays;
+                    gatherer.nearby(&met, &to, how, &mut memory);
+                    *rays += memory.rays - before;
                 }
                 let mut light = |gatherer: &Gatherer, seed: u64| {
                     gatherer.nearby(&met, &Receiver { seed, ..to }, how, &mut memory)
@@ -360,6 +362,8 @@ mod tests {
                 places += 1;
             }
             assert!(places > 40 && off[0] < 0.6 * off[1], "{places} {off:?}");
+            // Light that is worth nothing is followed by as few paths as is asked for at the least.
+            assert!(rays[0] > 6 * rays[1], "{rays:?}");
         });
     }
 }
