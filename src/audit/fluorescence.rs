@@ -49,6 +49,20 @@ impl<'a> PathTally<'a> {
     }
 }
 
+/// The greatest of all bands, 0 at the least.
+pub(super) fn greatest(bands: &Spectrum) -> f64 {
+    // Eight by eight: one by one each would wait for the one before.
+    let (eights, rest) = bands.as_chunks::<8>();
+    let mut greatest = [0.0; 8];
+    for eight in eights {
+        for (greatest, &x) in greatest.iter_mut().zip(eight) {
+            *greatest = f64::max(*greatest, x);
+        }
+    }
+    let all = greatest.iter().chain(rest).copied();
+    all.fold(0.0, f64::max)
+}
+
 /// What a path is multiplied by at a surface of an `albedo`: of reflection, or of one of the terms that fluoresce by chance, each as often
 /// as it may carry the most power.
 pub(super) fn goes_on(
@@ -70,7 +84,6 @@ pub(super) fn goes_on(
     let emission = |light: &LightSpectrum, t: &Spectrum| -> Spectrum {
         std::array::from_fn(|l| t[l] * light.power[l] * width)
     };
-    let greatest = |x: &Spectrum| x.iter().copied().fold(0.0, f64::max);
     let mut ways = vec![greatest(&reflected(throughput, 1.0))];
     let terms: Vec<_> = fluorescence.once().collect();
     for term in &terms {

@@ -25,7 +25,7 @@ impl Audit<'_> {
         for count in 0.. {
             let hit = self.closest(from, *direction, plane);
             let reach = hit.map_or(4.0 * self.mesh.reach, |hit| f64::from(hit.t));
-            *throughput = self.filtered(throughput, from, from + *direction * reach);
+            self.filter(throughput, from, from + *direction * reach);
             let mirror = hit.filter(|hit| self.mirrors.as_ref().is_some_and(|m| m.is_mirror(hit)));
             let Some(on) = mirror else {
                 return (hit, count);
@@ -88,16 +88,20 @@ impl Audit<'_> {
         throughput: &Spectrum,
     ) -> Option<Spectrum> {
         let (from, to) = (segment.from.as_dvec3(), segment.to.as_dvec3());
+        let mut left = *throughput;
         let Some(by) = by else {
             let open = !self.blocked(segment);
-            return open.then(|| self.filtered(throughput, from, to));
+            return open.then(|| {
+                self.filter(&mut left, from, to);
+                left
+            });
         };
         let mirrors = self.mirrors.as_ref()?;
         let route: Route = mirrors.route(by.image, by.at.point, to)?;
-        let (mut left, mut plane) = (*throughput, by.at.plane);
+        let mut plane = by.at.plane;
         let points = route.points();
         for (k, ends) in points.windows(2).enumerate() {
-            left = self.filtered(&left, ends[0], ends[1]);
+            self.filter(&mut left, ends[0], ends[1]);
             let Some(&(material, cosine)) = route.bounces().get(k) else {
                 let last = Segment::new(ends[0], ends[1], [plane, segment.planes[1]]);
                 return (!self.blocked(&last)).then_some(left);

@@ -133,7 +133,8 @@ impl Audit<'_> {
             return;
         }
         let density = self.density(sky, at, choice, direction);
-        let throughput = self.filtered(throughput, at.point, end);
+        let mut throughput = *throughput;
+        self.filter(&mut throughput, at.point, end);
         self.far(sky, direction, cosine / density, &throughput, sum);
     }
 

@@ -4,7 +4,7 @@
 //! by the balance heuristic (Veach and Guibas 1995). Paths end by Russian roulette, so no bounce is cut off.
 //! Figures are *measured*: each comes with the standard error of independent batches.
 
-use super::fluorescence::{PathTally, goes_on};
+use super::fluorescence::{PathTally, goes_on, greatest};
 use crate::color::Upsampler;
 use crate::geometry::RayIndex;
 use crate::geometry::openings::Openings;
@@ -33,6 +33,8 @@ pub struct Audit<'a> {
     /// Faces that emit, and the running sum of what they are chosen by.
     lamps: Vec<(Face, f64)>,
     total: f64,
+    /// What faces of each material are chosen by, per area: their power.
+    powers: Vec<f64>,
     pub(super) masked: bool,
     pub(super) panes: Option<Panes>,
     pub(super) mirrors: Option<Mirrors>,
@@ -87,7 +89,7 @@ pub(super) struct ByImage<'a> {
 pub(super) fn survives(throughput: &mut Spectrum, rng: &mut Pcg) -> bool {
     // Exactly what is left: a smaller chance would let weights grow without bound where albedos are near 1. Paths end, as no albedo
     // exceeds 0.999.
-    let chance = throughput.iter().copied().fold(0.0, f64::max).min(1.0);
+    let chance = greatest(throughput).min(1.0);
     if rng.f64() >= chance {
         return false;
     }
@@ -98,21 +100,21 @@ pub(super) fn survives(throughput: &mut Spectrum, rng: &mut Pcg) -> bool {
 impl<'a> Audit<'a> {
     /// Prepares the lamps of a room.
     pub fn new(scene: &'a Scene, mesh: &'a Mesh, rays: &'a RayIndex) -> Self {
+        let power = |material: &Material| {
+            material.even_emission().map_or(0.0, |e| {
+                let bands = e.shape.iter().zip(&scene.spectra[e.light].power);
+                bands.map(|(shape, power)| shape * power).sum()
+            })
+        };
+        let powers: Vec<f64> = scene.materials.iter().map(power).collect();
         let mut lamps = Vec::new();
         let mut total = 0.0;
         for &face in &mesh.faces {
-            let material = &scene.materials[mesh.material[face.triangle as usize] as usize];
-            if let Some(e) = material.even_emission() {
-                let power: f64 = e
-                    .shape
-                    .iter()
-                    .zip(&scene.spectra[e.light].power)
-                    .map(|(s, p)| s * p)
-                    .sum();
-                if power > 0.0 {
-                    total += power * mesh.area[face.triangle as usize];
-                    lamps.push((face, total));
-                }
+            let triangle = face.triangle as usize;
+            let power = powers[mesh.material[triangle] as usize];
+            if power > 0.0 {
+                total += power * mesh.area[triangle];
+                lamps.push((face, total));
             }
         }
         let masked = scene
@@ -132,6 +134,7 @@ impl<'a> Audit<'a> {
             upsampler,
             lamps,
             total,
+            powers,
             masked,
             panes: Panes::new(scene, mesh.centre),
             mirrors: Mirrors::new(scene, mesh),
@@ -251,8 +254,7 @@ impl<'a> Audit<'a> {
                 None => (self.albedo(triangle, weights), normal),
             };
             goes_on(self.scene, material, albedo, &mut throughput, rng, tally);
-            let greatest = throughput.iter().copied().fold(0.0, f64::max);
-            if greatest <= 0.0 {
+            if greatest(&throughput) <= 0.0 {
                 return;
             }
             if bounce >= SURE_BOUNCES && !survives(&mut throughput, rng) {
@@ -270,16 +272,7 @@ impl<'a> Audit<'a> {
 
     /// Density per area with which a lamp's triangle is chosen.
     fn chance(&self, triangle: usize) -> f64 {
-        let material = &self.scene.materials[self.mesh.material[triangle] as usize];
-        let Some(e) = material.even_emission() else {
-            return 0.0;
-        };
-        let power: f64 = e
-            .shape
-            .iter()
-            .zip(&self.scene.spectra[e.light].power)
-            .map(|(s, p)| s * p)
-            .sum();
+        let power = self.powers[self.mesh.material[triangle] as usize];
         if self.total > 0.0 {
             power / self.total
         } else {
@@ -339,7 +332,8 @@ impl<'a> Audit<'a> {
         let by_area = self.chance(triangle) * r2 / c2;
         let by_direction = c1 / PI;
         let factor = c1 / (by_area + by_direction);
-        let throughput = &self.filtered(throughput, at.point, q);
+        let mut throughput = *throughput;
+        self.filter(&mut throughput, at.point, q);
         for l in 0..BANDS {
             sum[l] += throughput[l] * radiance[l] * factor;
         }
@@ -546,10 +540,9 @@ impl<'a> Audit<'a> {
 /// Which of two ways light goes on, and by what it is multiplied: by chance, each as often as it may carry on the most of what is left,
 /// so that weights do not grow.
 fn one_side(sides: [Spectrum; 2], throughput: &Spectrum, rng: &mut Pcg) -> (Spectrum, bool) {
-    let [reflected, through] = sides.each_ref().map(|side| {
-        let carried = side.iter().zip(throughput).map(|(s, t)| s * t);
-        carried.fold(0.0, f64::max)
-    });
+    let [reflected, through] = sides
+        .each_ref()
+        .map(|side| greatest(&std::array::from_fn(|l| side[l] * throughput[l])));
     if reflected + through <= 0.0 {
         return ([0.0; BANDS], false);
     }

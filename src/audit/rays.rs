@@ -7,12 +7,9 @@ use crate::spectrum::Spectrum;
 use glam::DVec3;
 
 impl Audit<'_> {
-    /// What panes between two points leave of light, band by band.
-    pub(super) fn filtered(&self, throughput: &Spectrum, from: DVec3, to: DVec3) -> Spectrum {
-        let mut left = *throughput;
-        let Some(panes) = &self.panes else {
-            return left;
-        };
+    /// Takes from light what panes between two points keep of it, band by band.
+    pub(super) fn filter(&self, light: &mut Spectrum, from: DVec3, to: DVec3) {
+        let Some(panes) = &self.panes else { return };
         let scene = self.scene;
         let glazing = Glazing { panes, scene };
         for crossing in glazing.crossings(from.as_vec3(), to.as_vec3()) {
@@ -22,11 +19,10 @@ impl Audit<'_> {
             let [cosine, thickness, texel] =
                 [crossing.cosine, crossing.thickness, crossing.texel].map(f64::from);
             let passing = pane.passing(cosine, thickness, texel);
-            for (x, spectrum) in left.iter_mut().zip(pane.spectrum()) {
+            for (x, spectrum) in light.iter_mut().zip(pane.spectrum()) {
                 *x *= passing(*spectrum);
             }
         }
-        left
     }
 
     pub(super) fn closest(&self, from: DVec3, direction: DVec3, plane: u32) -> Option<Hit> {

@@ -230,7 +230,7 @@ mod tests {
     use super::*;
     use crate::transport::tests::baked;
 
-    fn plane_of(name: &str) -> WorkingPlane {
+    fn plane_of(name: &'static str) -> WorkingPlane {
         baked(name, 1).working_plane().unwrap()
     }
 

@@ -525,6 +525,13 @@ pub(super) mod tests {
     use crate::transport::tests::baked;
 
     pub(in crate::lightmap) fn begun(bake: &Bake) -> LightmapGrowth<'_> {
+        let mut growth = not_begun(bake);
+        growth.begin(&|_, _| {});
+        growth
+    }
+
+    /// The same before anything is looked at.
+    pub(in crate::lightmap) fn not_begun(bake: &Bake) -> LightmapGrowth<'_> {
         let spaces = bake.spaces();
         let all = charts(bake.scene(), bake.mesh(), bake.tree(), &spaces, &Conformal);
         let looks = Looks::new(
@@ -538,9 +545,7 @@ pub(super) mod tests {
             texels: 100_000,
             page: 1024,
         };
-        let mut growth = LightmapGrowth::new(bake, all, Sampler::new(looks), budget);
-        growth.begin(&|_, _| {});
-        growth
+        LightmapGrowth::new(bake, all, Sampler::new(looks), budget)
     }
 
     /// Below a wall a floor is lent light of both sides. Cells that took only their own side's for it believed that they were right, and light
@@ -548,7 +553,7 @@ pub(super) mod tests {
     #[test]
     fn cells_know_what_the_map_draws_at_covered_corners() {
         let bake = baked("furnished.glb", 1);
-        let growth = begun(&bake);
+        let growth = begun(bake);
         let placed = bake.placed(&growth, &Vec::new(), None).0;
         let mut apart = 0;
         for cell in growth.cells.iter().filter(|c| growth.is_bare(c)) {

@@ -103,7 +103,7 @@ mod tests {
     #[test]
     fn straight_light_bends_over_no_hinge() {
         let bake = baked("cornell.glb", 1);
-        let mut growth = begun(&bake);
+        let mut growth = begun(bake);
         growth.grow(0.5 * growth.sum(), &|_, _| {});
         let mut light = vec![0.0; growth.sampler.looks.len()];
         for cell in &growth.cells {
@@ -126,8 +126,8 @@ mod tests {
     #[test]
     fn evened_light_is_nearer_to_the_truth() {
         let bake = baked("furnished.glb", 2);
-        let mut growth = begun(&bake);
-        let points = growth.points(&bake, 0, &|_, _| {});
+        let mut growth = begun(bake);
+        let points = growth.points(bake, 0, &|_, _| {});
         let placed = bake.placed(&growth, &Vec::new(), None).0;
         let noise = summed(&growth.compared(&points, &placed), 1.0, None).noise;
         growth.noise = noise * noise;

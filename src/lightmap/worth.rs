@@ -106,14 +106,14 @@ impl LightmapGrowth<'_> {
 mod tests {
     use super::*;
     use crate::lightmap::cells::ChartCellError;
-    use crate::lightmap::grow::tests::begun;
+    use crate::lightmap::grow::tests::not_begun;
     use crate::transport::tests::baked;
 
     /// A chart that has to be twice as fine for one cell is worth less than one of few texels, and more for two such cells.
     #[test]
     fn cells_of_a_chart_share_what_it_takes() {
         let bake = baked("two-rooms.glb", 1);
-        let mut growth = begun(&bake);
+        let mut growth = not_begun(bake);
         let fine = |growth: &LightmapGrowth, c: &ChartCell| {
             let lattice = &growth.lattices[c.chart as usize];
             !lattice.single && lattice.counts.iter().product::<u32>() > 20

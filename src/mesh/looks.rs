@@ -388,8 +388,8 @@ pub(crate) mod tests {
             if let (&[a, b], true) = (low.as_slice(), askew && mesh.normal[t].y.abs() < 0.1) {
                 let (middle, step) = (0.5 * (a + b), 1e-3 * mesh.half_size * mesh.normal[t]);
                 let place = |k: f64| at(middle + k * step);
-                assert!(parted(&bake, &place(1.0), &place(-1.0)));
-                assert!(!parted(&bake, &place(1.0), &place(2.0)));
+                assert!(parted(bake, &place(1.0), &place(-1.0)));
+                assert!(!parted(bake, &place(1.0), &place(2.0)));
                 blocks += 1;
             }
         }

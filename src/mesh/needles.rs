@@ -253,7 +253,7 @@ mod tests {
     #[test]
     fn the_edge_of_a_needle_is_turned_unless_it_is_a_line() {
         let bake = baked("cornell.glb", 3);
-        let cells = &mut growth(&bake).cells;
+        let cells = &mut growth(bake).cells;
         let (of, edge) = needle(cells);
         let (area, hints) = held(cells);
         let flat = least_height(cells, of);
@@ -268,7 +268,7 @@ mod tests {
         let then = held(cells);
         assert!((then.0 / area - 1.0).abs() < 1e-12 && then.1 == hints && hints > 100);
 
-        let cells = &mut growth(&bake).cells;
+        let cells = &mut growth(bake).cells;
         let (of, edge) = needle(cells);
         cells.edges[edge as usize].sharp = 1;
         cells.turn_needles(&mut all);

@@ -1,7 +1,6 @@
 //! What a solution can be asked: light at receivers, and which receivers are covered.
 
 use super::estimate::{self, EstimatedError};
-use super::solution::{NOISE_AT_POINT, NOISE_AT_VERTEX};
 use super::{Bake, Closed, GatherQuality, flux};
 use crate::geometry::{NO_PLANE, Segment};
 use crate::hierarchy::NONE;
@@ -79,21 +78,15 @@ impl Bake {
             {
                 *hemisphere = &sketched;
             }
-            match quality {
-                GatherQuality::Full => gatherer.allowed_noise = NOISE_AT_POINT,
-                GatherQuality::Watched => {}
-                GatherQuality::Vertex(effort) => {
-                    gatherer.most_backs = MOSTLY;
-                    gatherer.allowed_noise = NOISE_AT_VERTEX.by(effort.samples());
-                    gatherer.tolerance *= effort.noise();
-                    if let Some(hemisphere) = &mut gatherer.hemisphere {
-                        scaled = hemisphere.scaled(effort.samples());
-                        *hemisphere = &scaled;
-                    }
-                }
-                GatherQuality::Preview => {
-                    gatherer.most_backs = MOSTLY;
-                    gatherer.allowed_noise = NOISE_AT_VERTEX;
+            gatherer.allowed_noise = quality.allowed_noise();
+            if matches!(quality, GatherQuality::Vertex(_) | GatherQuality::Preview) {
+                gatherer.most_backs = MOSTLY;
+            }
+            if let GatherQuality::Vertex(effort) = quality {
+                gatherer.tolerance *= effort.noise();
+                if let Some(hemisphere) = &mut gatherer.hemisphere {
+                    scaled = hemisphere.scaled(effort.samples());
+                    *hemisphere = &scaled;
                 }
             }
             let at = |memory: &mut Memory, r: &Receiver| gatherer.at(r, memory).pack();

@@ -38,7 +38,7 @@ mod refinement;
 mod reflection;
 mod representation;
 mod room;
-pub(crate) mod solution;
+mod solution;
 pub(crate) mod solver;
 mod solving;
 mod sources;

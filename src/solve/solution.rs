@@ -1,7 +1,7 @@
 //! What a round solves for: the light on the hierarchy, on the lanes chosen for it.
 
-use super::punctual;
 use super::room::{Room, by_rays};
+use super::{GatherQuality, punctual};
 use crate::hierarchy::Tree;
 use crate::light::lanes::Lanes;
 use crate::light::{Filters, Glass, Light, Rows, brightness, lightness_sensitivity, weighed};
@@ -14,7 +14,7 @@ const GATHER_SHARE: f64 = 0.1;
 /// At points that are asked for, which are few. With as much noise as in the solve and with this they are off by 4.7 and 3.9 % in a dungeon at the default, by 3.5
 /// and 3.0 in a restaurant, 2.6 and 2.5 in a living room, 2.6 and 2.0 in a home theatre and 1.9 and 1.6 in a garage (root mean square beside Mitsuba, seed 0), in
 /// the same time. With half of it and 64 turns, in the solve as well, by 4.0, 2.9, 2.3, 1.9 and 1.6 % in 1.1, 1.1, 1.9, 1.5 and 1.3 times the time.
-pub(crate) const NOISE_AT_POINT: AllowedNoise = AllowedNoise {
+const NOISE_AT_POINT: AllowedNoise = AllowedNoise {
     lamps: 1.0,
     most_rays: 1024,
     glare: 1.0,
@@ -38,12 +38,25 @@ const NOISE_IN_SOLVE: AllowedNoise = AllowedNoise {
 /// .35 for .33. A ray may bring two tolerances and close by as many paths are followed as 8 ask for: files at `--error 1` are off by .72, .92 and .93 dE00
 /// beside Mitsuba (two or three seeds; a sunlit room .25), with one tolerance, 16, and no fewer than 64 paths by .76, .88 and .99 (.28); a garage
 /// takes .82 of the CPU time, a theatre 1.00 and .80 in two runs.
-pub(crate) const NOISE_AT_VERTEX: AllowedNoise = AllowedNoise {
+const NOISE_AT_VERTEX: AllowedNoise = AllowedNoise {
     glare: 2.0,
     nearby: 8.0,
     paths: [8, 1024],
     ..NOISE_IN_SOLVE
 };
+
+impl GatherQuality {
+    /// What light may err by chance.
+    pub(crate) fn allowed_noise(self) -> AllowedNoise {
+        match self {
+            Self::Full => NOISE_AT_POINT,
+            Self::Watched => NOISE_IN_SOLVE,
+            Self::Vertex(effort) => NOISE_AT_VERTEX.by(effort.samples()),
+            Self::Preview => NOISE_AT_VERTEX,
+        }
+    }
+}
+
 /// A relative error of 1 % of a mid grey is about this colour difference, see `estimate`.
 pub(crate) const DE_PER_PERCENT: f64 = 0.35;
 

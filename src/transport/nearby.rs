@@ -58,7 +58,8 @@ impl Gatherer<'_> {
     ) -> f64 {
         let bright = |hit: &(u32, Hit)| f64::from(self.light.bright_reflected[hit.0 as usize]);
         let light: Vec<f64> = hits.iter().map(bright).collect();
-        let carries = share * light.iter().sum::<f64>();
+        let all: f64 = light.iter().sum();
+        let carries = share * all;
         let worth = carries / (self.allowed_noise.nearby * self.tolerance_at(to, carries));
         let [least, most] = self.allowed_noise.paths;
         let paths = ((worth * worth).ceil() as usize).clamp(least, most);
@@ -66,7 +67,7 @@ impl Gatherer<'_> {
         let mut pairs = Vec::new();
         for turn in 0..paths.div_ceil(FOLLOWED) as u32 {
             // Other hits in every turn, as far as there are others.
-            let some = chosen(&light, count, sequence02(turn, 0)[0]);
+            let some = chosen(&light, all, count, sequence02(turn, 0)[0]);
             let some = some.map(|(k, weight)| (hits[k], weight, weight * light[k]));
             self.paths_back(some, (to.seed, turn), backs, memory, &mut pairs);
         }
@@ -218,9 +219,9 @@ impl Gatherer<'_> {
 }
 
 /// Some of what is close by, half of them evenly and half by their light, and what each then weighs: if all were chosen evenly, a few dark ones could stand for bright
-/// ones with a path that meets a lamp. All of them, once, where that many are asked for.
-fn chosen(light: &[f64], count: usize, first: f64) -> impl Iterator<Item = (usize, f64)> {
-    let mean = light.iter().sum::<f64>() / light.len() as f64;
+/// ones with a path that meets a lamp. All of them, once, where that many are asked for. `all`: their light together.
+fn chosen(light: &[f64], all: f64, count: usize, first: f64) -> impl Iterator<Item = (usize, f64)> {
+    let mean = all / light.len() as f64;
     let part = move |k: usize| match count < light.len() && mean > 0.0 {
         true => 0.5 * (light[k] / mean + 1.0),
         false => 1.0,
@@ -257,7 +258,7 @@ fn believed(pairs: &[[f64; 2]]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::solve::solution::{NOISE_AT_POINT, NOISE_AT_VERTEX};
+    use crate::solve::{Effort, GatherQuality};
     use crate::transport::MOSTLY;
     use crate::transport::gatherer::AllowedNoise;
     use crate::transport::receiver::Gathered;
@@ -270,19 +271,22 @@ mod tests {
         let leaves = bake.tree().leaves().step_by(17);
         let places: Vec<Receiver> = leaves.map(|leaf| middle(bake.tree(), leaf)).collect();
         bake.room.with_sight(|sight| {
-            let at = |AllowedNoise { nearby, paths, .. }: AllowedNoise| -> Vec<Gathered> {
+            let points = GatherQuality::Full.allowed_noise();
+            let at = |quality: GatherQuality| -> Vec<Gathered> {
+                let AllowedNoise { nearby, paths, .. } = quality.allowed_noise();
                 let gatherer = Gatherer {
                     allowed_noise: AllowedNoise {
                         nearby,
                         paths,
-                        ..NOISE_AT_POINT
+                        ..points
                     },
                     ..bake.gatherer(sight)
                 };
                 let memory = &mut Memory::default();
                 places.iter().map(|to| gatherer.at(to, memory)).collect()
             };
-            let (points, vertices) = (at(NOISE_AT_POINT), at(NOISE_AT_VERTEX));
+            let points = at(GatherQuality::Full);
+            let vertices = at(GatherQuality::Vertex(Effort::default()));
             let (mut more, mut fewer) = (0, 0);
             // What lies inside something is not gathered at a vertex.
             for (point, vertex) in points.iter().zip(&vertices).filter(|p| p.1.backs <= MOSTLY) {
@@ -332,7 +336,7 @@ mod tests {
         let (mut sum, mut bright, mut least) = ([0.0; 2], 0, f64::INFINITY);
         for turn in 0..1000 {
             let mut all = 0.0;
-            for (k, weight) in chosen(&light, 8, sequence02(turn, 0)[0]) {
+            for (k, weight) in chosen(&light, 10.0, 8, sequence02(turn, 0)[0]) {
                 sum = [sum[0] + weight, sum[1] + weight * light[k]];
                 bright += usize::from(light[k] > 0.0);
                 all += weight * light[k];
@@ -344,9 +348,9 @@ mod tests {
         assert!((sum[1] / 800.0 - 1.0).abs() < 0.01, "{sum:?}");
         assert!((4300..4500).contains(&bright), "{bright}");
         assert!(least > 0.4, "{least}");
-        let all: Vec<_> = chosen(&light, 100, 0.7).collect();
+        let all: Vec<_> = chosen(&light, 10.0, 100, 0.7).collect();
         assert_eq!(all, (0..100).map(|k| (k, 1.0)).collect::<Vec<_>>());
-        assert!(chosen(&[0.0; 9], 3, 0.5).all(|(_, weight)| weight == 1.0));
+        assert!(chosen(&[0.0; 9], 0.0, 3, 0.5).all(|(_, weight)| weight == 1.0));
     }
 
     #[test]

@@ -38,6 +38,8 @@ pub struct Distribution {
     /// Toward the sun.
     sun: DVec3,
     scale: f64,
+    /// `exp(d pi/2)` of its type.
+    across: f64,
 }
 
 impl Distribution {
@@ -51,6 +53,7 @@ impl Distribution {
             kind,
             sun,
             scale: 1.0,
+            across: (TYPES.get(kind as usize - 1)).map_or(0.0, |t| (t[3] * FRAC_PI_2).exp()),
         };
         let scale = 1.0 / plain.level();
         Self { scale, ..plain }
@@ -107,7 +110,7 @@ impl Distribution {
             return 0.0;
         };
         let cosine = direction.dot(self.sun).clamp(-1.0, 1.0);
-        let haze = c * ((d * cosine.acos()).exp() - (d * FRAC_PI_2).exp());
+        let haze = c * ((d * cosine.acos()).exp() - self.across);
         haze.max(0.0) / (1.0 + haze + e * cosine * cosine)
     }
 
@@ -124,8 +127,7 @@ impl Distribution {
         }
         if c != 0.0 {
             let cosine = direction.dot(self.sun).clamp(-1.0, 1.0);
-            shape *=
-                1.0 + c * ((d * cosine.acos()).exp() - (d * FRAC_PI_2).exp()) + e * cosine * cosine;
+            shape *= 1.0 + c * ((d * cosine.acos()).exp() - self.across) + e * cosine * cosine;
         }
         shape
     }
