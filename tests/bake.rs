@@ -78,7 +78,7 @@ fn threads_and_onlookers_change_nothing() {
             .build()
             .unwrap();
         pool.install(|| {
-            let mut bake = Bake::new(room("two-rooms.glb"), settings(2.0));
+            let mut bake = Bake::new(room("two-rooms.glb"), settings(4.0));
             let phases: Arc<Mutex<Vec<&str>>> = Arc::default();
             if watched {
                 let phases = Arc::clone(&phases);

@@ -166,8 +166,7 @@ fn no_dark_fringe_beside_a_block() {
             let at = dvec3(0.1 + x, 0.5 + y, 4.9);
             room.quad(at, 0.1 * DVec3::X, 0.1 * DVec3::Y, wall);
         }
-        let mut bake = Bake::new(room.scene(), Settings::default());
-        bake.run();
+        let bake = built::baked_to(1.0, room.scene());
         let (beside, below) = floor_beside(&bake, low, high);
         assert!(beside.len() > 50 && below > 1, "{} {below}", beside.len());
         let teeth = beside.iter().filter(|light| {

@@ -175,8 +175,7 @@ fn cuts_are_the_same_at_any_number_of_threads() {
             room.quad(dvec3(1.3, 0.0, 0.0), 3.0 * DVec3::Y, slant, wall);
             room.quad(dvec3(2.3, 0.0, 0.0), 3.0 * DVec3::Y, slant, wall);
             room.block(dvec3(3.0, -0.2, 1.0), dvec3(3.5, 1.0, 2.0), wall);
-            let mut bake = Bake::new(room.scene(), Settings::default());
-            bake.run();
+            let bake = built::baked_to(4.0, room.scene());
             let baked = bake.baked(&|_, _| {});
             let text = format!("{:?} {:?}", bake.mesh().triangles, baked.irradiance);
             (text, bake.tree().nodes.len())

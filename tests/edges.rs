@@ -29,39 +29,56 @@ fn vertices(baked: &Baked) -> usize {
     baked.surfaces.iter().map(|s| s.vertices.len()).sum()
 }
 
-/// Triangles that face `normal` and hold a place: irradiance there as a viewer draws it.
-fn held(bake: &Bake, baked: &Baked, at: DVec3, normal: DVec3) -> (f64, String) {
-    let mut best = (f64::NEG_INFINITY, 0.0, String::new());
-    for part in &baked.surfaces {
-        let surface = &bake.scene().surfaces[part.surface];
-        for t in &part.triangles {
-            let [a, b, c] = t.map(|v| position(surface, &part.vertices[v as usize]));
+/// What is written in a plane through the origin: corners of the triangles that face as it does, and irradiance there.
+struct Plane {
+    normal: DVec3,
+    triangles: Vec<[(DVec3, f64); 3]>,
+}
+
+impl Plane {
+    fn of(bake: &Bake, baked: &Baked, normal: DVec3) -> Self {
+        let all = baked.surfaces.iter().flat_map(|part| {
+            let surface = &bake.scene().surfaces[part.surface];
+            let corner = move |v: u32| {
+                let v = &part.vertices[v as usize];
+                (position(surface, v), f64::from(v.irradiance[1]))
+            };
+            part.triangles.iter().map(move |t| t.map(corner))
+        });
+        let lies_in_it = |corners: &[(DVec3, f64); 3]| {
+            let [a, b, c] = corners.map(|corner| corner.0);
             let n = (b - a).cross(c - a);
-            if n.dot(normal) < 0.99 * n.length() || (at - a).dot(normal).abs() > 1e-6 {
-                continue;
-            }
-            let weight = |p: DVec3, q: DVec3| (p - at).cross(q - at).dot(n) / n.length_squared();
-            let w = [weight(b, c), weight(c, a), weight(a, b)];
-            let least = w.into_iter().fold(f64::INFINITY, f64::min);
-            if least > best.0 {
-                let y = |k: usize| f64::from(part.vertices[t[k] as usize].irradiance[1]);
-                best = (
-                    least,
-                    (0..3).map(|k| w[k] * y(k)).sum(),
-                    format!("{a:.4} {:.0} {b:.4} {:.0} {c:.4} {:.0}", y(0), y(1), y(2)),
-                );
-            }
+            n.dot(normal) >= 0.99 * n.length() && a.dot(normal).abs() <= 1e-6
+        };
+        Self {
+            normal,
+            triangles: all.filter(lies_in_it).collect(),
         }
     }
-    (best.1, best.2)
-}
 
-fn drawn(bake: &Bake, baked: &Baked, at: DVec3, normal: DVec3) -> f64 {
-    held(bake, baked, at, normal).0
-}
+    /// The triangle that holds a place, and how much each of its corners counts there.
+    fn held(&self, at: DVec3) -> (&[(DVec3, f64); 3], [f64; 3]) {
+        let all = self.triangles.iter().map(|corners| {
+            let [a, b, c] = corners.map(|corner| corner.0);
+            let n = (b - a).cross(c - a);
+            let weight = |p: DVec3, q: DVec3| (p - at).cross(q - at).dot(n) / n.length_squared();
+            let weights = [weight(b, c), weight(c, a), weight(a, b)];
+            let least = weights.into_iter().fold(f64::INFINITY, f64::min);
+            (least, corners, weights)
+        });
+        let (_, corners, weights) = all.reduce(|x, y| if y.0 > x.0 { y } else { x }).unwrap();
+        (corners, weights)
+    }
 
-fn show(bake: &Bake, baked: &Baked, at: DVec3, normal: DVec3) {
-    eprintln!("   in {}", held(bake, baked, at, normal).1);
+    /// Irradiance at a place as a viewer draws it.
+    fn drawn(&self, at: DVec3) -> f64 {
+        let (corners, weights) = self.held(at);
+        (0..3).map(|k| weights[k] * corners[k].1).sum()
+    }
+
+    fn show(&self, at: DVec3) {
+        eprintln!("   in {:.4?}", self.held(at).0);
+    }
 }
 
 type Ends = [[u32; 3]; 2];
@@ -147,7 +164,7 @@ fn wrong(
     outlines: &[Vec<DVec3>],
     expected: impl Fn(usize, DVec3) -> f64,
 ) -> usize {
-    let mut wrong = 0;
+    let (floor, mut wrong) = (Plane::of(bake, baked, DVec3::Y), 0);
     for k in 0..160 * 160 {
         let (x, z) = (f64::from(k % 160) + 0.37, f64::from(k / 160) + 0.61);
         let at = dvec3(-2.0 + x / 40.0, 0.0, -2.0 + z / 40.0);
@@ -160,10 +177,10 @@ fn wrong(
         let truth: f64 = (0..all.len())
             .map(|l| if depths[l] > 0.0 { 0.0 } else { all[l] })
             .sum();
-        let light = drawn(bake, baked, at, DVec3::Y);
+        let light = floor.drawn(at);
         if (light - truth).abs() > 0.5 * least {
             eprintln!("{at} drawn {light} true {truth}");
-            show(bake, baked, at, DVec3::Y);
+            floor.show(at);
             wrong += 1;
         }
     }
@@ -301,13 +318,15 @@ fn agrees(
         let near = around.iter().flatten().filter(|d| d.dot(n) == 0.0);
         near.map(|d| hidden(p + *d)).all(|h| h == hidden(p))
     };
+    let planes = [DVec3::Y, DVec3::Z].map(|n| Plane::of(&out.0, &out.1, n));
     let wrong = places.iter().filter(|(p, n)| {
+        let plane = planes.iter().find(|plane| plane.normal == *n).unwrap();
         let truth = if hidden(*p) { 0.0 } else { full(*n) };
-        let light = drawn(&out.0, &out.1, *p, *n);
+        let light = plane.drawn(*p);
         let off = even(*p, *n) && (light - truth).abs() > 0.25 * full(*n);
         if off {
             eprintln!("{p} facing {n}: drawn {light}, true {truth}");
-            show(&out.0, &out.1, *p, *n);
+            plane.show(*p);
         }
         off
     });
@@ -515,12 +534,12 @@ fn no_dark_rays_run_from_a_plate_on_a_floor() {
     });
     room.mesh(positions, triangles.collect(), black);
     let (bake, baked) = baked(room.scene());
-    let mut least = f64::INFINITY;
+    let (floor, mut least) = (Plane::of(&bake, &baked, DVec3::Y), f64::INFINITY);
     for k in 0..9 {
         for t in 0..8 {
             let on = corner(k, 1.0).lerp(corner((k + 1) % 9, 1.0), f64::from(t) / 8.0);
             let out = (on - dvec3(2.6, 0.0, 3.1)).normalize();
-            let light = |far: f64| drawn(&bake, &baked, on + far * out, DVec3::Y);
+            let light = |far: f64| floor.drawn(on + far * out);
             least = least.min(light(0.06) / light(0.3));
         }
     }
@@ -560,16 +579,16 @@ fn no_comb_at_the_half_shadow_of_a_table() {
     let (bake, baked) = baked(room.scene());
     no_cracks(&bake, &baked);
     // Along the long sides of the shadow light hardly changes: steps between neighbours are teeth.
-    let mut worst = 0.0_f64;
+    let (floor, mut worst) = (Plane::of(&bake, &baked, DVec3::Y), 0.0_f64);
     for z in (0..40).map(|k| 2.9 + 0.05 * f64::from(k)) {
         let at = |k: i32| dvec3(2.6 + 0.01 * f64::from(k), 0.0, z);
-        let light = |k: i32| drawn(&bake, &baked, at(k), DVec3::Y);
+        let light = |k: i32| floor.drawn(at(k));
         let row: Vec<f64> = (0..120).map(light).collect();
         for nine in row.windows(9) {
             worst = worst.max((nine[4] - 0.5 * (nine[0] + nine[8])).abs());
         }
     }
-    let open = drawn(&bake, &baked, dvec3(3.2, 0.0, 2.4), DVec3::Y);
+    let open = floor.drawn(dvec3(3.2, 0.0, 2.4));
     eprintln!("{} vertices, {worst:.2} of {open:.1} lx", vertices(&baked));
     // .15 of it; .31 without turned edges.
     assert!(worst < 0.2 * open, "{worst} of {open} lx");
@@ -596,16 +615,9 @@ fn no_hairs_between_panels_on_a_wall() {
     let (bake, baked) = baked(room.scene());
     no_cracks(&bake, &baked);
     // A decimetre above the panels light changes slowly along the wall.
-    let mut worst = 0.0_f64;
+    let (wall, mut worst) = (Plane::of(&bake, &baked, DVec3::Z), 0.0_f64);
     for y in (0..19).map(|k| 2.0 + 0.02 * f64::from(k)) {
-        let light = |k: i32| {
-            drawn(
-                &bake,
-                &baked,
-                dvec3(0.1 + 0.01 * f64::from(k), y, 0.0),
-                DVec3::Z,
-            )
-        };
+        let light = |k: i32| wall.drawn(dvec3(0.1 + 0.01 * f64::from(k), y, 0.0));
         let row: Vec<f64> = (0..580).map(light).collect();
         for nine in row.windows(9) {
             worst = worst.max((nine[4] / (0.5 * (nine[0] + nine[8])) - 1.0).abs());

@@ -132,7 +132,7 @@ fn furnished() -> Scene {
     room.scene()
 }
 
-/// What is given out is absorbed, band by band, after every round.
+/// What is given out is absorbed, band by band, after every round; and what is given out arrives.
 #[test]
 fn flux_balance_of_a_closed_room() {
     let mut bake = Bake::new(furnished(), Settings::default());
@@ -144,12 +144,6 @@ fn flux_balance_of_a_closed_room() {
         assert!(flux.escaped_lm.abs() < 7.0, "{flux:?}");
         near(flux.emitted_lm, 4000.0, 1e-6);
     }
-}
-
-/// And what is given out arrives.
-#[test]
-fn received_flux_of_a_closed_room() {
-    let bake = baked(furnished());
     near(bake.rounds().last().unwrap().flux.received_lm, 7000.0, 2e-3);
 }
 
@@ -256,7 +250,8 @@ fn no_leak(rho: f64, thick: bool) {
         let seen = &bake.probe(&[(point, normal)])[0];
         assert_eq!(seen.xyz, [0.0; 3], "rho {rho}, thick {thick} at {point}");
     }
-    let output = bake.baked(&|_, _| {});
+    // Few vertices: what is dark takes no more than the input's.
+    let output = built::baked_within(2000, &bake);
     for surface in output.surfaces.iter().filter(|s| s.surface < 6) {
         for v in &surface.vertices {
             assert_eq!(v.irradiance, [0.0; 3], "rho {rho}, thick {thick}: {v:?}");

@@ -14,12 +14,7 @@ use haarlight::spectrum::{
 
 /// Bakes with default settings and checks what must hold of any room.
 fn baked(scene: Scene) -> Bake {
-    baked_with(scene, Settings::default())
-}
-
-fn baked_with(scene: Scene, settings: Settings) -> Bake {
-    let mut bake = Bake::new(scene, settings);
-    bake.run();
+    let bake = built::baked(scene);
     sound(&bake);
     bake
 }
@@ -103,7 +98,8 @@ fn albedo_near_one() {
 }
 
 /// 40 x 2 x 3 m at .99: several slow modes.
-fn white_corridor() -> Scene {
+#[test]
+fn long_white_corridor() {
     let mut room = Room::new();
     let (wall, lamp) = (room.paint(0.99), room.lamp(0.5, 1000.0));
     room.hollow(
@@ -111,18 +107,11 @@ fn white_corridor() -> Scene {
         dvec3(40.0, 3.0, 2.0),
         [lamp, wall, wall, wall, wall, wall],
     );
-    room.scene()
-}
-
-#[test]
-fn long_white_corridor() {
-    let bake = baked_with(
-        white_corridor(),
-        Settings {
-            rounds: 5,
-            ..Settings::default()
-        },
-    );
+    let mut bake = Bake::new(room.scene(), Settings::default());
+    for _ in 0..5 {
+        bake.step();
+    }
+    sound(&bake);
     let last = bake.rounds().last().unwrap();
     // Plain sweeps would take a thousand.
     assert!(last.iterations < 60, "{}", last.iterations);
@@ -132,12 +121,9 @@ fn long_white_corridor() {
         lux(&bake, dvec3(39.0, 0.0, 1.0), DVec3::Y),
     );
     assert!(bright > dark && dark > 0.0, "{bright} {dark}");
-}
-
-/// With default settings it comes to an end in seconds, too.
-#[test]
-fn long_white_corridor_ends() {
-    baked(white_corridor());
+    // With default settings it comes to an end in seconds, too.
+    bake.run();
+    sound(&bake);
 }
 
 /// Albedo 1 and above in a file is taken as .999 and said.

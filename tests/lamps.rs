@@ -1,6 +1,7 @@
 //! Lamps as they are sold: what a profile on a light, on a node or on a surface brings, against closed forms and quadrature.
 
 use crate::common;
+use crate::common::built::glanced;
 
 use common::Room;
 use glam::{DVec3, dvec3};
@@ -171,18 +172,6 @@ fn lux(bake: &Bake, at: DVec3) -> f64 {
     bake.probe(&[(at, DVec3::Y)])[0].xyz[1]
 }
 
-fn baked(scene: Scene) -> Bake {
-    let mut bake = Bake::new(
-        scene,
-        Settings {
-            error: 0.5,
-            ..Settings::default()
-        },
-    );
-    bake.run();
-    bake
-}
-
 /// Where the floor is seen from `height` at angles of the file.
 fn below(height: f64, gamma: f64, c: f64) -> DVec3 {
     let (r, c) = (height * gamma.to_radians().tan(), c.to_radians());
@@ -217,7 +206,7 @@ fn a_profile_lights_the_floor_by_its_closed_form() {
     ];
     for scene in scenes {
         assert_eq!(scene.warnings, Vec::<String>::new());
-        let bake = baked(scene);
+        let bake = glanced(scene);
         for gamma in [0.0, 5.0, 20.0, 45.0, 60.0, 65.0] {
             for c in [0.0, 30.0, 90.0, 180.0, 240.0, 315.0] {
                 let want = lopsided(gamma, c) * gamma.to_radians().cos().powi(3) / 2.5_f64.powi(2);
@@ -303,7 +292,7 @@ fn flux_closes_with_the_lumens_of_the_file() {
         let lamp = &Facts::of(&scene).lights[0];
         let want = lamp.profile.as_ref().unwrap().flux_lm;
         assert!((lamp.flux_lm.unwrap() / want - 1.0).abs() < 1e-9);
-        let bake = baked(scene);
+        let bake = glanced(scene);
         let flux = bake.rounds().last().unwrap().flux;
         assert!((flux.sent.lamps_lm / want - 1.0).abs() < 1e-6, "{flux:?}");
         assert!(
@@ -371,7 +360,7 @@ fn a_panel_shines_from_its_area() {
             &json!({"profile": "lamp.ies", "name": "cie/D65"}),
             &[],
         );
-        let bake = baked(scene);
+        let bake = glanced(scene);
         for at in [
             [0.0, 0.0],
             [0.5, 0.2],
@@ -411,7 +400,7 @@ fn a_lambertian_profile_changes_nothing() {
     ];
     let with = json!({"profile": "lambert.ies", "name": "cie/F11"});
     let without = json!({"name": "cie/F11", "luminance_cd_m2": 500.0 / 0.72});
-    let [a, b] = [with, without].map(|wish| baked(panel_room(2.0, &wish, &block)));
+    let [a, b] = [with, without].map(|wish| glanced(panel_room(2.0, &wish, &block)));
     for at in [
         [0.0, 0.0],
         [0.3, 0.3],
@@ -432,7 +421,7 @@ fn a_lambertian_profile_changes_nothing() {
 #[test]
 fn a_panel_is_right_close_by() {
     let wish = json!({"profile": "lambert.ies", "name": "cie/D65"});
-    let bake = baked(panel_room(2.0, &wish, &[]));
+    let bake = glanced(panel_room(2.0, &wish, &[]));
     let corners = [[-0.6, -0.3], [0.6, -0.3], [0.6, 0.3], [-0.6, 0.3]];
     let panel = corners.map(|[x, z]| dvec3(x, 2.0, z));
     for below in [0.1, 0.03, 0.01, 2e-3] {
@@ -485,7 +474,7 @@ fn audit_and_reference_agree() {
         let places = [[0.0, 0.0], [0.4, 0.1], [1.2, 0.3], [-1.5, 1.0]];
         let points: Vec<_> = places.map(|[x, z]| (dvec3(x, 0.0, z), DVec3::Y)).into();
         let dense = reference.gather(&scene, &solution, &points, 1);
-        let bake = baked(scene);
+        let bake = glanced(scene);
         let centre = bake.mesh().centre;
         let audit = Audit::new(bake.scene(), bake.mesh(), bake.rays());
         let starts: Vec<_> = points

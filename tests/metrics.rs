@@ -1,10 +1,12 @@
 //! `haarlight probe --metrics` on the Cornell box: columns, ranges, and what the colour of the walls does to the light.
 
+use crate::common::built::glanced;
+
 use haarlight::scene::{Options, Scene};
-use haarlight::solve::{Bake, Settings};
 use serde_json::Value;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::Command;
+use std::sync::LazyLock;
 
 const NAMES: [&str; 12] = [
     "lux", "CCT_K", "Duv", "Ra", "R9", "Rf", "Rg", "EDI_sc", "EDI_mc", "EDI_lc", "EDI_rh",
@@ -16,10 +18,9 @@ fn probed(options: &[&str]) -> (String, String) {
     let folder = tempfile::tempdir().unwrap();
     let points = folder.path().join("points.csv");
     std::fs::write(&points, POINTS).unwrap();
-    let room = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/cornell.glb");
     let output = Command::new(env!("CARGO_BIN_EXE_haarlight"))
         .arg("probe")
-        .arg(room)
+        .arg(cornell())
         .arg("--points")
         .arg(points)
         .args(options)
@@ -41,8 +42,8 @@ x,y,z,nx,ny,nz
 
 #[test]
 fn metrics_come_after_the_other_columns() {
-    let (plain, _) = probed(&[]);
-    let (csv, said) = probed(&["--metrics"]);
+    let (plain, _) = probed(&["--error", "4"]);
+    let (csv, said) = probed(&["--error", "4", "--metrics"]);
     let header: Vec<&str> = csv.lines().next().unwrap().split(',').collect();
     let before = plain.lines().next().unwrap();
     assert!(csv.starts_with(before), "{header:?}");
@@ -216,29 +217,28 @@ fn metrics_of_bake(options: &[&str]) -> Value {
     verdict["metrics"].clone()
 }
 
-/// A probe of the points on its floor that the log tells of, and what else is asked for.
-fn floor_probed(options: &[&str]) -> Value {
-    let room = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/cornell.glb");
-    let settings = Settings {
-        rounds: 1,
-        ..Settings::default()
-    };
-    let mut bake = Bake::new(Scene::load(&room, &Options::default()).unwrap(), settings);
-    bake.run();
+fn cornell() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/cornell.glb")
+}
+
+/// The points on its floor that the log tells of, as a file for `probe`.
+static FLOOR: LazyLock<String> = LazyLock::new(|| {
+    let bake = glanced(Scene::load(cornell(), &Options::default()).unwrap());
     let plane = bake.working_plane().unwrap().points;
     let rows = plane
         .iter()
         .map(|(p, _)| format!("{},{},{},0,1,0\n", p.x, p.y, p.z));
+    "x,y,z,nx,ny,nz\n".to_owned() + &rows.collect::<String>()
+});
+
+/// A probe of these points, and what else is asked for.
+fn floor_probed(options: &[&str]) -> Value {
     let folder = tempfile::tempdir().unwrap();
     let points = folder.path().join("points.csv");
-    std::fs::write(
-        &points,
-        "x,y,z,nx,ny,nz\n".to_owned() + &rows.collect::<String>(),
-    )
-    .unwrap();
+    std::fs::write(&points, &*FLOOR).unwrap();
     let output = Command::new(env!("CARGO_BIN_EXE_haarlight"))
         .args(["probe", "--metrics", "--json", "--error", "1", "-q"])
-        .arg(room)
+        .arg(cornell())
         .arg("--points")
         .arg(&points)
         .args(options)

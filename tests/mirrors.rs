@@ -2,7 +2,7 @@
 
 use crate::common::built;
 
-use built::{Room, baked, close, glanced};
+use built::{Room, baked, close, glanced, run};
 use glam::{DVec3, dvec3};
 use haarlight::audit::Audit;
 use haarlight::color::{KM, Observer};
@@ -269,10 +269,10 @@ fn a_lamp_in_a_tinted_mirror_is_tinted() {
     let power = room.power(0);
     let exact = Settings {
         representation: Representation::Dense,
+        rounds: 1,
         ..Settings::default()
     };
-    let mut bake = Bake::new(room.scene(), exact);
-    bake.run();
+    let bake = run(room.scene(), exact);
     let image = dvec3(-0.8, 1.5, 2.0);
     for (got, place) in spectra(&bake, &floor()).into_iter().zip(floor()) {
         for (k, normal) in copper().into_iter().enumerate() {
@@ -360,7 +360,12 @@ fn a_ball_agrees_within_its_noise() {
     room.mesh(corners, triangles, mirror);
     let panel = room.lamp(0.2, 2000.0);
     room.quad(dvec3(0.6, 2.99, 0.6), DVec3::X * 1.6, DVec3::Z * 1.6, panel);
-    let bake = baked(room.scene());
+    let settings = Settings {
+        error: 1.0,
+        rounds: 3,
+        ..Settings::default()
+    };
+    let bake = run(room.scene(), settings);
     let at = |k: i32| (0.5 + 0.6 * f64::from(k % 6), 0.5 + 0.6 * f64::from(k / 6));
     let places: Vec<(f64, f64)> = (0..36).map(at).collect();
     let points = upwards(&places);
@@ -385,7 +390,11 @@ fn no_light_is_lost_or_made() {
         let walls = [mirror, paint, paint, paint, paint, paint];
         room.hollow(DVec3::ZERO, dvec3(4.0, 3.0, 4.0), walls);
         room.point(dvec3(1.7, 1.6, 2.2), 1000.0);
-        let flux = baked(room.scene()).rounds().last().unwrap().flux;
+        let settings = Settings {
+            rounds: 2,
+            ..Settings::default()
+        };
+        let flux = run(room.scene(), settings).rounds()[1].flux;
         println!("{rho}: {flux:?}");
         close(flux.received_lm, 1000.0, 0.01, "received");
         close(flux.absorbed_lm, 1000.0, 0.01, "absorbed");
@@ -420,11 +429,11 @@ fn threads_change_nothing() {
             let ball = room.mirror([0.8; BANDS]);
             room.mesh(corners, triangles, ball);
             let settings = Settings {
+                error: 2.0,
                 rounds: 2,
                 ..Settings::default()
             };
-            let mut bake = Bake::new(room.scene(), settings);
-            bake.run();
+            let bake = run(room.scene(), settings);
             let probed = bake.probe(&floor());
             let bits = |x: &f64| x.to_bits();
             let probed: Vec<u64> = probed
@@ -504,7 +513,7 @@ fn the_program_says_why_and_refuses_what_it_cannot_keep() {
     // What is kept knows mirrors.
     let [cache, checkpoint] = ["cache", "checkpoint"].map(|k| format!("--{k}={}", named(k)));
     let out = named("out.glb");
-    let bake = ["bake", room, "-o", &out, "--error=6", &cache, &checkpoint];
+    let bake = ["bake", room, "-o", &out, "--error=9", &cache, &checkpoint];
     let (code, text) = haarlight(&bake);
     assert!(matches!(code, Some(0 | 1)), "{code:?}: {text}");
     let (code, text) = haarlight(&["relight", room, &cache, "-o", &named("relit.glb")]);

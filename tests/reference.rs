@@ -2,7 +2,7 @@
 
 use crate::common::built;
 
-use built::{Room, extrapolated, faces, sun};
+use built::{Room, baked, extrapolated, faces, run, sun};
 use glam::{DVec3, dvec3};
 use haarlight::color::{KM, Observer};
 use haarlight::link::exchange;
@@ -123,6 +123,23 @@ fn painted_points() -> Vec<(DVec3, DVec3)> {
     inner_points(DVec3::ZERO, dvec3(3.0, 2.0, 4.0))
 }
 
+/// The same with its order taken out.
+static TRUTH: LazyLock<Vec<Spectrum>> = LazyLock::new(|| extrapolated(&painted_truth(2), &PAINTED));
+
+/// That box baked to an error.
+fn painted(error: f64, representation: Representation) -> Bake {
+    let settings = Settings {
+        error,
+        representation,
+        ..Settings::default()
+    };
+    run(painted_box(), settings)
+}
+
+/// To a fine one, once for all tests.
+static ADAPTIVE: LazyLock<Bake> = LazyLock::new(|| painted(0.1, Representation::Adaptive));
+static DENSE: LazyLock<Bake> = LazyLock::new(|| painted(0.1, Representation::Dense));
+
 /// The order of the reference: mean of a cube of albedo .8 with a lamp of one face is exact, points against the finest.
 #[test]
 fn the_reference_converges() {
@@ -191,25 +208,16 @@ fn the_reference_converges() {
 /// The solver in 64 bands against the reference, band by band, at points.
 #[test]
 fn the_solver_agrees_in_every_leaf() {
-    let scene = painted_box();
     let points = painted_points();
-    let truth = extrapolated(&painted_truth(2), &PAINTED);
-    let settings = Settings {
-        error: 0.1,
-        representation: Representation::Dense,
-        ..Settings::default()
-    };
-    let mut bake = Bake::new(scene, settings);
-    bake.run();
     let mut square = 0.0;
-    for (probed, truth) in bake.probe(&points).iter().zip(&truth) {
+    for (probed, truth) in DENSE.probe(&points).iter().zip(&*TRUTH) {
         for (got, want) in probed.spectrum.iter().zip(truth) {
             let off = got / want - 1.0;
             square += off * off;
         }
     }
     let rms = (square / (BANDS * points.len()) as f64).sqrt();
-    let claim = bake.rounds().last().unwrap().error.total_relative.value;
+    let claim = DENSE.rounds().last().unwrap().error.total_relative.value;
     println!("rms {rms:e}, claimed {claim:?}");
     assert!(rms < claim.unwrap() / 0.7, "{rms:e} of {claim:?}");
 }
@@ -219,15 +227,9 @@ fn the_solver_agrees_in_every_leaf() {
 fn the_solver_converges_to_the_reference() {
     let (points, truth) = (painted_points(), &PAINTED);
     let mut before = f64::INFINITY;
-    for error in [2.0, 0.5, 0.1] {
-        let mut bake = Bake::new(
-            painted_box(),
-            Settings {
-                error,
-                ..Settings::default()
-            },
-        );
-        bake.run();
+    let coarser = [2.0, 0.5].map(|error| (error, painted(error, Representation::Adaptive)));
+    let all = coarser.iter().map(|(error, bake)| (*error, bake));
+    for (error, bake) in all.chain([(0.1, &*ADAPTIVE)]) {
         let white = bake.light().white;
         let weights = Observer::cie1931()
             .weights(&Grid::default())
@@ -275,8 +277,7 @@ fn the_solver_agrees_behind_a_screen() {
         .iter()
         .map(lux)
         .collect();
-    let mut bake = Bake::new(scene, Settings::default());
-    bake.run();
+    let bake = baked(scene);
     let offs: Vec<f64> = bake
         .probe(&points)
         .iter()
@@ -356,7 +357,7 @@ fn the_order_of_the_solver() {
 /// Adaptive rows, rows of 64 bands and the reference: each pair lies as near as the estimates of both claim.
 #[test]
 fn adaptive_dense_and_reference_agree() {
-    let (points, truth) = (painted_points(), &PAINTED);
+    let (points, truth) = (painted_points(), &TRUTH);
     let weights = Observer::cie1931()
         .weights(&Grid::default())
         .map(|w| w.map(|x| KM * x));
@@ -366,18 +367,7 @@ fn adaptive_dense_and_reference_agree() {
             .map(|w| bands.iter().zip(w).map(|(x, w)| x * w).sum::<f64>())
     };
     let exact: Vec<[f64; 3]> = truth.iter().map(xyz).collect();
-    let bakes = [Representation::Adaptive, Representation::Dense].map(|representation| {
-        let mut bake = Bake::new(
-            painted_box(),
-            Settings {
-                representation,
-                error: 0.25,
-                ..Settings::default()
-            },
-        );
-        bake.run();
-        bake
-    });
+    let bakes: [&Bake; 2] = [&ADAPTIVE, &DENSE];
     let white = bakes[1].light().white;
     let distance = |a: &[[f64; 3]], b: &[[f64; 3]]| {
         let pairs = a.iter().zip(b);
@@ -390,13 +380,13 @@ fn adaptive_dense_and_reference_agree() {
         let last = bake.rounds().last().unwrap();
         last.error.total_de2000.value.unwrap() / 0.7
     };
-    let seen = bakes.each_ref().map(|bake| {
+    let seen = bakes.map(|bake| {
         bake.probe(&points)
             .iter()
             .map(|p| p.xyz)
             .collect::<Vec<_>>()
     });
-    let (adaptive, dense) = (claim(&bakes[0]), claim(&bakes[1]));
+    let (adaptive, dense) = (claim(bakes[0]), claim(bakes[1]));
     let found = [
         (distance(&seen[0], &exact), adaptive),
         (distance(&seen[1], &exact), dense),
@@ -423,8 +413,7 @@ fn off_the_reference(scene: &Scene, truth: &[Spectrum], points: &[(DVec3, DVec3)
         representation: Representation::Dense,
         ..Settings::default()
     };
-    let mut bake = Bake::new(scene.clone(), settings);
-    bake.run();
+    let bake = run(scene.clone(), settings);
     let mut square = 0.0;
     for (probed, truth) in bake.probe(points).iter().zip(truth) {
         println!("{} for {}", probed.spectrum[32], truth[32]);

@@ -4,6 +4,7 @@ use crate::common::every_effect::small;
 
 use glam::DVec3;
 use haarlight::color::de2000;
+use haarlight::gather::refined::position;
 use haarlight::gather::{Baked, BakedVertex, MOSTLY};
 use haarlight::geometry::{NO_PLANE, Segment};
 use haarlight::keep::{Relighter, Relit};
@@ -14,6 +15,7 @@ use haarlight::scene::{Options, Scene};
 use haarlight::solve::{Bake, Representation, Settings};
 use haarlight::store::container;
 use proptest::prelude::*;
+use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::LazyLock;
@@ -23,7 +25,14 @@ fn scenes() -> PathBuf {
 }
 
 fn room(name: &str) -> Scene {
-    Scene::load(scenes().join(name), &Options::default()).unwrap()
+    with(name, json!({}))
+}
+
+/// A room with what is said over its side file.
+fn with(name: &str, said: Value) -> Scene {
+    let mut options = Options::default();
+    options.say(said);
+    Scene::load(scenes().join(name), &options).unwrap()
 }
 
 fn settings(error: f64, rounds: usize) -> Settings {
@@ -35,14 +44,14 @@ fn settings(error: f64, rounds: usize) -> Settings {
 }
 
 /// A cache of a bake, and the bake.
-struct Cached {
+pub(crate) struct Cached {
     cache: Vec<u8>,
-    bake: Bake,
-    baked: Baked,
+    pub(crate) bake: Bake,
+    pub(crate) baked: Baked,
 }
 
 impl Cached {
-    fn new(scene: Scene, settings: Settings) -> Self {
+    pub(crate) fn new(scene: Scene, settings: Settings) -> Self {
         Self::within(&Limits::default(), scene, settings)
     }
 
@@ -64,7 +73,7 @@ impl Cached {
         opened(&self.cache, scene)
     }
 
-    fn relit(&self, scene: Scene) -> (Relighter, Relit) {
+    pub(crate) fn relit(&self, scene: Scene) -> (Relighter, Relit) {
         let mut relighter = self.open(scene).unwrap();
         let relit = relighter.relight().unwrap();
         (relighter, relit)
@@ -84,13 +93,13 @@ static CORNELL: LazyLock<Cached> =
     LazyLock::new(|| Cached::new(room("cornell.glb"), settings(1.0, 9)));
 static FURNISHED: LazyLock<Cached> =
     LazyLock::new(|| Cached::new(room("furnished.glb"), settings(3.0, 3)));
-static GLAZED: LazyLock<Cached> =
+pub(crate) static GLAZED: LazyLock<Cached> =
     LazyLock::new(|| Cached::new(room("glazed.glb"), settings(4.0, 2)));
 static MIRRORED: LazyLock<Cached> =
     LazyLock::new(|| Cached::new(room("mirrored.glb"), settings(4.0, 2)));
 
 /// Tristimulus irradiance of all vertices.
-fn irradiance(baked: &Baked) -> Vec<[f64; 3]> {
+pub(crate) fn irradiance(baked: &Baked) -> Vec<[f64; 3]> {
     let vertices = baked.surfaces.iter().flat_map(|s| &s.vertices);
     vertices.map(|v| v.irradiance.map(f64::from)).collect()
 }
@@ -164,12 +173,11 @@ fn estimate(bake: &Bake) -> f64 {
 /// Nothing changed: the bake to rounding, on the same mesh. There is no ray index, so a ray would see everything.
 #[test]
 fn without_a_change_the_bake_comes_out() {
-    let [closed, two] = ["cornell-closed.glb", "two-rooms.glb"]
-        .map(|name| Cached::new(room(name), settings(2.0, 9)));
+    let closed = Cached::new(room("cornell-closed.glb"), settings(2.0, 9));
     for (name, cached) in [
         ("cornell.glb", &*CORNELL),
         ("cornell-closed.glb", &closed),
-        ("two-rooms.glb", &two),
+        ("two-rooms.glb", &SMALL[0]),
         ("furnished.glb", &*FURNISHED),
         ("glazed.glb", &GLAZED),
         ("mirrored.glb", &MIRRORED),
@@ -298,7 +306,7 @@ fn lamps_go_out_in_a_furnished_room() {
         measured < stated.hypot(estimate(&fresh)),
         "{measured} {stated}"
     );
-    assert!(difference(&fresh, &cached.baked, 4) > 3.0 * measured);
+    assert!(difference(&fresh, &cached.baked, 1) > 3.0 * measured);
 }
 
 /// Lamps behind panes and in mirrors, the colours of panes and mirrors themselves: what a fresh bake finds.
@@ -351,13 +359,138 @@ fn panes_and_mirrors_leave_what_they_leave_in_a_fresh_bake() {
     }
 }
 
+/// Triangles that are compared.
+const COMPARED: usize = 300;
+/// Where they are read: beside a vertex, where what is drawn between vertices is of no weight.
+const BESIDE: [f64; 3] = [0.98, 0.01, 0.01];
+
+/// A triangle of a baked mesh.
+struct Drawn {
+    area: f64,
+    /// Beside its first corner.
+    place: DVec3,
+    normal: DVec3,
+    surface: usize,
+    corners: [u32; 3],
+}
+
+impl Drawn {
+    /// Tristimulus irradiance there.
+    fn read(&self, baked: &Baked) -> [f64; 3] {
+        let vertices = &baked.surfaces[self.surface].vertices;
+        let corners = self.corners.map(|v| vertices[v as usize].irradiance);
+        [0, 1, 2].map(|c| (0..3).map(|k| BESIDE[k] * f64::from(corners[k][c])).sum())
+    }
+}
+
+/// The largest triangles of a mesh.
+fn largest(scene: &Scene, baked: &Baked) -> Vec<Drawn> {
+    let mut all = Vec::new();
+    for (surface, part) in baked.surfaces.iter().enumerate() {
+        let input = &scene.surfaces[part.surface];
+        all.extend(part.triangles.iter().map(|&corners| {
+            let [a, b, c] = corners.map(|v| position(input, &part.vertices[v as usize]));
+            let across = (b - a).cross(c - a);
+            Drawn {
+                area: across.length(),
+                place: BESIDE[0] * a + BESIDE[1] * b + BESIDE[2] * c,
+                normal: across.normalize_or_zero(),
+                surface,
+                corners,
+            }
+        }));
+    }
+    all.sort_by(|a, b| b.area.total_cmp(&a.area));
+    all.truncate(COMPARED);
+    all
+}
+
+/// Relights a room of which something is `said` and a `lamp` dimmed, and compares vertices with what a bake of the changed room finds beside them.
+/// That vertices stand off their light is taken out by the bake of the room as it was. The colours differ by no more than both errors that are
+/// stated allow, estimates being at least .7 of what is measured. Returns how far illuminances are apart in the mean.
+fn relit_is_baked(name: &str, said: Value, lamp: &str, error: f64) -> f64 {
+    // Few vertices have 300 triangles, too.
+    let limits = Limits {
+        vertices: Some(4000),
+        ..Limits::default()
+    };
+    let cached = Cached::within(&limits, room(name), settings(error, 12));
+    let mut scene = with(name, said);
+    scene.dim(lamp, 0.3).unwrap();
+    let (_, relit) = cached.relit(scene.clone());
+    let mut fresh = Bake::new(scene, settings(error, 12));
+    fresh.run();
+    let places = largest(cached.bake.scene(), &cached.baked);
+    let points: Vec<(DVec3, DVec3)> = places.iter().map(|p| (p.place, p.normal)).collect();
+    let found = cached
+        .bake
+        .probe(&points)
+        .into_iter()
+        .zip(fresh.probe(&points));
+    let white = fresh.light().white;
+    let [
+        mut apart,
+        mut moved,
+        mut lux,
+        mut off,
+        mut bias,
+        mut compared,
+    ] = [0.0; 6];
+    for (place, (full, now)) in places.iter().zip(found) {
+        let [was, shown] = [&cached.baked, &relit.baked].map(|baked| place.read(baked));
+        // Where something covers a vertex it has its neighbours' light.
+        if !(0.5..2.0).contains(&(was[1] / full.xyz[1])) {
+            continue;
+        }
+        compared += 1.0;
+        let want = [0, 1, 2].map(|c| was[c] * now.xyz[c] / full.xyz[c]);
+        apart += de2000(shown, want, white);
+        moved += de2000(was, want, white);
+        lux += place.area * want[1];
+        off += place.area * (shown[1] - want[1]).abs();
+        bias += place.area * (shown[1] - want[1]);
+    }
+    let [apart, moved] = [apart / compared, moved / compared];
+    let [off, bias] = [off / lux, bias / lux];
+    let stated = [relit.record.error_de2000.value.unwrap(), estimate(&fresh)];
+    println!(
+        "{name}: {compared} compared, dE00 {apart:.3} apart, {moved:.2} moved, stated {stated:.3?}, off {off:.4}, bias {bias:+.4}"
+    );
+    assert!(4.0 * compared > 3.0 * COMPARED as f64, "{compared}");
+    assert!(moved > 5.0 * apart, "{moved} moved, {apart} apart");
+    assert!(
+        0.7 * apart < stated[0].hypot(stated[1]),
+        "{apart} of {stated:?}"
+    );
+    // Half a per cent at the default error of .5, as of a bake, and in proportion. All vertices look in the same directions, which err for the
+    // light of lamps otherwise than for that of walls: with walls that turn from .7 to .1 the mirrored room is .6 % dark at 1, .5 % at .5, and
+    // by points with directions of their own neither bake is off by more than .2 %.
+    assert!(bias.abs() < 0.01 * error, "{name}: bias {bias}");
+    off
+}
+
+#[test]
+fn a_room_behind_panes_is_dimmed_as_it_is_baked() {
+    // At 1 illuminances are .5 % apart.
+    let off = relit_is_baked("glazed.glb", json!({}), "sun", 0.7);
+    assert!(off < 0.012, "{off}");
+}
+
+/// The bulb stands before a mirror, and the walls are seen in all three.
+#[test]
+fn a_room_with_mirrors_is_changed_as_it_is_baked() {
+    let blue = json!({"materials": {"walls": {"reflectance": {"name": "macbeth/blue"}}}});
+    let off = relit_is_baked("mirrored.glb", blue, "bulb", 1.0);
+    assert!(off < 0.025, "{off}");
+}
+
 /// Another pane, or a mirror that is none any more, is another shape: where light goes is in the cache.
 #[test]
 fn moved_panes_and_dull_mirrors_are_refused() {
     let refused = |which: usize, change: &dyn Fn(&mut Scene)| {
-        let (mut other, cache) = SMALL[which].clone();
+        let mut other = SMALL[which].bake.scene().clone();
         change(&mut other);
-        let error = opened(&cache, other).err().unwrap();
+        let error = SMALL[which].open(other).err().unwrap();
         assert_eq!(error.exit_code(), 2);
         error.to_string()
     };
@@ -441,10 +574,10 @@ fn another_shape_is_refused_with_what_changed() {
     let refused = |scene: Scene| {
         let error = cached.open(scene).err().unwrap();
         assert_eq!(error.exit_code(), 2);
-        let mut open = cached.open(room("furnished.glb")).unwrap();
-        assert!(open.change(room("convex.glb")).is_err());
         error.to_string()
     };
+    let mut open = cached.open(room("furnished.glb")).unwrap();
+    assert!(open.change(room("convex.glb")).is_err());
     let mut moved = room("furnished.glb");
     moved.surfaces[4].positions[2].z += 0.01;
     let name = moved.surfaces[4].name.clone();
@@ -488,12 +621,12 @@ fn another_shape_is_refused_with_what_changed() {
 fn a_resumed_bake_writes_the_same_cache() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);
-    let mut whole = Bake::new(room("two-rooms.glb"), settings(2.0, 3));
+    let mut whole = Bake::new(room("two-rooms.glb"), settings(5.0, 2));
     whole.keep();
     whole.step();
     whole.save(&at("state")).unwrap();
     whole.run();
-    let mut resumed = Bake::new(room("two-rooms.glb"), settings(2.0, 3));
+    let mut resumed = Bake::new(room("two-rooms.glb"), settings(5.0, 2));
     let text = resumed.resume(&at("state")).unwrap_err().to_string();
     assert!(text.contains("--cache changed"), "{text}");
     resumed.keep();
@@ -511,13 +644,12 @@ fn a_resumed_bake_writes_the_same_cache() {
 }
 
 /// Rooms and their caches: one of few triangles, and such with panes and mirrors.
-static SMALL: LazyLock<[(Scene, Vec<u8>); 3]> = LazyLock::new(|| {
+static SMALL: LazyLock<[Cached; 3]> = LazyLock::new(|| {
     use EffectKind::{Mirrors, Panes};
-    let of = |scene: Scene, settings| (scene.clone(), Cached::new(scene, settings).cache);
     [
-        of(room("two-rooms.glb"), settings(5.0, 2)),
-        of(small(&[Panes]), settings(9.0, 1)),
-        of(small(&[Mirrors]), settings(9.0, 1)),
+        Cached::new(room("two-rooms.glb"), settings(5.0, 2)),
+        Cached::new(small(&[Panes]), settings(9.0, 1)),
+        Cached::new(small(&[Mirrors]), settings(9.0, 1)),
     ]
 });
 
@@ -532,7 +664,8 @@ proptest! {
         early in any::<bool>(),
         which in prop::sample::select(vec![0, 0, 1, 2]),
     ) {
-        let (scene, mut bytes) = SMALL[which].clone();
+        let Cached { cache, bake, .. } = &SMALL[which];
+        let (scene, mut bytes) = (bake.scene().clone(), cache.clone());
         bytes.truncate(bytes.len() - 8);
         for (at, with, count) in changes {
             let at = at.index(if early { 4096 } else { bytes.len() });
@@ -590,7 +723,7 @@ fn the_command_relights() {
     let baked = read("cornell.baked.glb");
     let (code, said, out) = run(&["relight", "cornell.glb", "--json", "-o", "same.glb"]);
     assert_eq!(code, Some(0), "{said}");
-    let line: serde_json::Value = serde_json::from_slice(&out).unwrap();
+    let line: Value = serde_json::from_slice(&out).unwrap();
     assert_eq!(line["changed"], false);
     // The same meshes; only digits of numbers in the text may be fewer or more.
     let binary =
@@ -598,7 +731,7 @@ fn the_command_relights() {
     assert_eq!(binary(&read("same.glb")), binary(&baked));
     // A lamp of half the power: half the light, and an exposure that makes up for it.
     let spectra = String::from_utf8(read("cornell.spectra.json")).unwrap();
-    let mut spectra: serde_json::Value = serde_json::from_str(&spectra).unwrap();
+    let mut spectra: Value = serde_json::from_str(&spectra).unwrap();
     let lamp = spectra["materials"]
         .as_object_mut()
         .unwrap()
@@ -606,7 +739,7 @@ fn the_command_relights() {
         .find(|m| m.get("emission").is_some())
         .unwrap();
     let name = lamp["emission"]["name"].as_str().unwrap_or("").to_owned();
-    lamp["emission"] = serde_json::json!({"name": "cie/F2", "luminance_cd_m2": 100.0});
+    lamp["emission"] = json!({"name": "cie/F2", "luminance_cd_m2": 100.0});
     assert_ne!(name, "cie/F2");
     std::fs::write(folder.path().join("evening.json"), spectra.to_string()).unwrap();
     let args = [
@@ -618,7 +751,7 @@ fn the_command_relights() {
     ];
     let (code, said, out) = run(&args);
     assert_eq!(code, Some(0), "{said}");
-    let line: serde_json::Value = serde_json::from_slice(&out).unwrap();
+    let line: Value = serde_json::from_slice(&out).unwrap();
     assert_eq!(line["changed"], true);
     assert!(read("cornell.baked.glb") != baked);
     // Another room, an input as the output, and a file that is no cache.
@@ -642,25 +775,20 @@ fn the_command_relights() {
 /// Lamps that shared a spectrum get spectra of their own, and share one again: lanes follow, and nobody's light is lost.
 #[test]
 fn lamps_get_spectra_of_their_own_and_share_one_again() {
-    let read = |changes: &str| {
-        let mut options = Options::default();
-        options.say(serde_json::from_str(changes).unwrap());
-        Scene::load(scenes().join("furnished.glb"), &options).unwrap()
-    };
     let tinted = || {
-        read(
-            r#"{ "materials": { "bulb": { "emission": { "name": "cie/F11", "luminance_cd_m2": 20000 } } } }"#,
-        )
+        let emission = json!({"name": "cie/F11", "luminance_cd_m2": 20000});
+        let said = json!({"materials": {"bulb": {"emission": emission}}});
+        with("furnished.glb", said)
     };
-    let lights = |scene: &Scene| scene.spectra.len();
-    assert!(lights(&tinted()) > lights(&read("{}")));
-    let cached = Cached::new(read("{}"), settings(3.0, 2));
+    let plain = || room("furnished.glb");
+    assert!(tinted().spectra.len() > plain().spectra.len());
+    let cached = Cached::new(plain(), settings(3.0, 2));
     let mean = |baked: &Baked| -> f64 {
         let all = irradiance(baked);
         all.iter().map(|xyz| xyz[1]).sum::<f64>() / all.len() as f64
     };
     let before = mean(&cached.baked);
-    let (mut relighter, _) = cached.relit(read("{}"));
+    let (mut relighter, _) = cached.relit(plain());
     relighter.change(tinted()).unwrap();
     let more = relighter.relight().unwrap();
     let mut fresh = Bake::new(tinted(), settings(3.0, 2));
@@ -676,7 +804,7 @@ fn lamps_get_spectra_of_their_own_and_share_one_again() {
         "{measured} {stated}"
     );
     // What is undone is undone, by way of a first answer.
-    relighter.change(read("{}")).unwrap();
+    relighter.change(plain()).unwrap();
     relighter.relight_roughly().unwrap();
     let back = mean(&relighter.relight().unwrap().baked);
     assert!((back / before - 1.0).abs() < 0.01, "{back} {before}");

@@ -5,7 +5,7 @@ use crate::common::daylit;
 
 use built::{Room, sun};
 use daylit::{
-    LUX, bake, bake_at, cie, facade, given_up, glanced, glanced_by, past_the_horizon, points,
+    LUX, bake, cie, facade, given_up, glanced, glanced_in_grey, past_the_horizon, points,
     points_beside, roof, room, row, through, traced, wish,
 };
 use glam::{DMat4, DVec3, dvec3};
@@ -43,7 +43,7 @@ fn quadrature(kind: u8, opening: f64) -> Vec<f64> {
 
 /// The points of a room, every panel of which is cut into `cuts` x `cuts` squares, against quadrature and the report.
 fn check(kind: u8, opening: f64, cuts: usize, seed: u64, truth: &[f64]) {
-    let bake = glanced_by(room(0.0, opening, cuts), &wish(kind), seed);
+    let bake = glanced_in_grey(room(0.0, opening, cuts), &wish(kind), seed);
     let lux: Vec<f64> = bake.probe(&points()).iter().map(|p| p.xyz[1]).collect();
     let (mut worst, mut squares) = (0.0_f64, 0.0);
     for (k, (got, want)) in lux.iter().zip(truth).enumerate() {
@@ -134,7 +134,7 @@ fn ground_below_the_horizon_lights_a_ceiling() {
         let (mut worst, mut squares) = (0.0_f64, 0.0);
         let mut room = Room::new();
         let window = facade(&mut room, whole);
-        let bake = glanced(room, &wish(kind));
+        let bake = glanced_in_grey(room, &wish(kind), 0);
         let sky = Distribution::new(kind, direction(60.0, 0.0));
         let seen = |d: DVec3| if d.y > 0.0 { sky.radiance(d) } else { 0.3 / PI };
         let places = points_beside();
@@ -162,7 +162,7 @@ fn an_even_sky_gives_open_ground_pi_l() {
         brightness: Some(SkyBrightness::Luminance(1000.0)),
         ..wish(5)
     };
-    let bake = bake(room, &wish);
+    let bake = glanced(room, &wish);
     let at = dvec3(2.0, 0.0, 1.3);
     let lux = bake.probe(&[(at, DVec3::Y)])[0].xyz[1];
     println!("open ground: {lux} for {}", 1000.0 * PI);
@@ -186,7 +186,7 @@ fn the_sun_lights_a_patch_of_the_floor() {
         ..wish(12)
     };
     for cuts in [1, 6] {
-        let bake = bake_at(room(0.0, 1.0, cuts), &wish, 1.0);
+        let bake = glanced(room(0.0, 1.0, cuts), &wish);
         // From the middle of the opening down along its rays, to the west.
         let x = 2.0 - 3.0 / 60.0_f64.to_radians().tan();
         let at = |x: f64| (cie(x, 2.0, 0.0), DVec3::Y);
@@ -213,7 +213,7 @@ fn the_edge_of_a_sun_patch_is_as_wide_as_its_disc() {
         brightness: Some(SkyBrightness::Illuminance(0.0)),
         ..wish(12)
     };
-    let bake = bake_at(room(0.0, 1.0, 1), &wish, 1.0);
+    let bake = glanced(room(0.0, 1.0, 1), &wish);
     let open = 80_000.0 * 60.0_f64.to_radians().sin();
     for radii in [-1.1, -0.8, -0.4, 0.0, 0.4, 0.8, 1.1_f64] {
         // From here the eastern edge of the opening stands so much higher than the sun's middle.

@@ -5,6 +5,8 @@
 
 use glam::{DMat4, DVec3, dvec3};
 use haarlight::color::{KM, Observer};
+use haarlight::gather::Baked;
+use haarlight::mesh::Limits;
 use haarlight::scene::fluorescence::{Fluorescence, Term};
 use haarlight::scene::mirror::Mirror;
 use haarlight::scene::pane::{Pane, PaneKind};
@@ -56,6 +58,15 @@ pub(crate) fn run(scene: Scene, settings: Settings) -> Bake {
     let mut bake = Bake::new(scene, settings);
     bake.run();
     bake
+}
+
+/// The mesh of a bake with no more vertices than these, but for those of the input.
+pub(crate) fn baked_within(vertices: usize, bake: &Bake) -> Baked {
+    let limits = Limits {
+        vertices: Some(vertices),
+        ..Limits::default()
+    };
+    bake.baked_within(&limits, &|_, _| {})
 }
 
 /// `a` is `b`, but for a share of it. Printed for `tools/effects/closed_forms.py`.

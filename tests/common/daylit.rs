@@ -8,6 +8,8 @@ use haarlight::scene::Scene;
 use haarlight::scene::sky::{SkyBrightness, SkyType, SkyWish};
 use haarlight::solve::{Bake, Settings};
 use std::f64::consts::PI;
+use std::iter::Sum;
+use std::ops::Mul;
 
 /// Prints a row of the table in `BENCHMARKS.md`: a case of CIE 171, what of it, the worst point and the root mean square, as shares.
 pub(crate) fn row(case: &str, what: &str, worst: f64, rms: f64) {
@@ -38,15 +40,7 @@ pub(crate) fn wish(kind: u8) -> SkyWish {
 }
 
 pub(crate) fn bake(room: Room, wish: &SkyWish) -> Bake {
-    bake_at(room, wish, 0.5)
-}
-
-pub(crate) fn bake_at(room: Room, wish: &SkyWish, error: f64) -> Bake {
-    let settings = Settings {
-        error,
-        ..Settings::default()
-    };
-    built::run(under(room, wish), settings)
+    built::baked(under(room, wish))
 }
 
 fn under(room: Room, wish: &SkyWish) -> Scene {
@@ -58,19 +52,23 @@ pub(crate) fn glanced(room: Room, wish: &SkyWish) -> Bake {
     built::glanced(under(room, wish))
 }
 
-/// The same by patterns of another seed.
-pub(crate) fn glanced_by(room: Room, wish: &SkyWish, seed: u64) -> Bake {
-    let settings = Settings {
+/// The same for grey light, under a white beside which none is worth dividing a patch for, or telling its colour.
+pub(crate) fn glanced_in_grey(room: Room, wish: &SkyWish, seed: u64) -> Bake {
+    built::run(under(room, wish), in_grey(seed))
+}
+
+fn in_grey(seed: u64) -> Settings {
+    Settings {
         rounds: 1,
         seed,
+        white: Some([1e9; 3]),
         ..Settings::default()
-    };
-    built::run(under(room, wish), settings)
+    }
 }
 
 /// A bake of which not even the first round is done: it has the light that random points see.
 pub(crate) fn given_up(room: Room, wish: &SkyWish) -> Bake {
-    let mut bake = Bake::new(under(room, wish), Settings::default());
+    let mut bake = Bake::new(under(room, wish), in_grey(0));
     assert!(bake.step_unless(std::sync::Arc::new(|| true)).is_none());
     bake
 }
@@ -214,12 +212,13 @@ const LEGENDRE: [[f64; 2]; 2] = [
 /// the most, where the glow about the sun has its tip, as the midpoint rule of 400 by 400 points is by 1.1e-4.
 const CELLS: usize = 32;
 
-/// The same of a sky and a ground that are smooth each: an upright opening is cut at the horizon, where what is seen jumps.
-pub(crate) fn past_the_horizon(
-    seen: impl Fn(DVec3) -> f64,
+/// The same of a sky and a ground that are smooth each, of several at once too: an upright opening is cut at the horizon, where what is
+/// seen jumps.
+pub(crate) fn past_the_horizon<T: Mul<f64, Output = T> + Sum>(
+    seen: impl Fn(DVec3) -> T,
     [corner, u, v]: [DVec3; 3],
     place: (DVec3, DVec3),
-) -> f64 {
+) -> T {
     let upright = v.x == 0.0 && v.z == 0.0;
     let share = match upright {
         true => ((place.0.y - corner.y) / v.y).clamp(0.0, 1.0),
@@ -231,11 +230,11 @@ pub(crate) fn past_the_horizon(
     there.map(|part| smooth(&seen, part, place)).sum()
 }
 
-fn smooth(
-    seen: impl Fn(DVec3) -> f64,
+fn smooth<T: Mul<f64, Output = T> + Sum>(
+    seen: impl Fn(DVec3) -> T,
     [corner, u, v]: [DVec3; 3],
     (point, normal): (DVec3, DVec3),
-) -> f64 {
+) -> T {
     let (area, across) = (u.cross(v).length(), u.cross(v).normalize());
     let cells = (0..CELLS).flat_map(|cell| {
         LEGENDRE.into_iter().flat_map(move |[node, weight]| {
@@ -244,17 +243,15 @@ fn smooth(
         })
     });
     let line: Vec<(f64, f64)> = cells.collect();
-    let mut sum = 0.0;
-    for (t, of_row) in &line {
-        for (s, weight) in &line {
-            let way = corner + u * *s + v * *t - point;
-            let r2 = way.length_squared();
-            let d = way / r2.sqrt();
-            let brings = normal.dot(d).max(0.0) * across.dot(d).abs() / r2;
-            sum += of_row * weight * seen(d) * brings;
-        }
-    }
-    sum * area
+    let nodes = line.iter().flat_map(|a| line.iter().map(move |b| (a, b)));
+    let brought = nodes.map(|((t, of_row), (s, weight))| {
+        let way = corner + u * *s + v * *t - point;
+        let r2 = way.length_squared();
+        let d = way / r2.sqrt();
+        let brings = normal.dot(d).max(0.0) * across.dot(d).abs() / r2;
+        seen(d) * (of_row * weight * brings)
+    });
+    brought.sum::<T>() * area
 }
 
 /// The opening in the roof: a corner and two sides.

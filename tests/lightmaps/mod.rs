@@ -5,7 +5,9 @@ mod room;
 mod shown;
 
 use crate::common::built;
+use crate::report::three;
 
+use built::baked_to;
 use file::{Mapped, Texels};
 use glam::{DVec2, DVec3, dvec3};
 use haarlight::audit::{PathReference, Report};
@@ -15,33 +17,23 @@ use haarlight::lightmap::{LightMaps, MapLimits};
 use haarlight::output::maps::{self, Precision};
 use haarlight::output::{BakedGlb, Exposure, mapped_glb};
 use haarlight::scene::{Options, Scene};
-use haarlight::solve::{Bake, Settings};
+use haarlight::solve::Bake;
 use serde_json::Value;
 use std::path::Path;
 use std::process::Command;
+use std::sync::LazyLock;
 use tempfile::TempDir;
 
 /// Display value of 1 lm/m2 in these tests.
 const SCALE: f64 = 0.005;
 
 /// A room with its maps, written and read back.
-struct Written {
-    bake: Bake,
+struct Written<'a> {
+    bake: &'a Bake,
     maps: LightMaps,
     glb: BakedGlb,
     index: Value,
     pages: Vec<Texels>,
-    folder: TempDir,
-}
-
-fn solved(scene: Scene, error: f64) -> Bake {
-    let settings = Settings {
-        error,
-        ..Settings::default()
-    };
-    let mut bake = Bake::new(scene, settings);
-    bake.run();
-    bake
 }
 
 fn room() -> Scene {
@@ -51,30 +43,44 @@ fn room() -> Scene {
     Scene::load(path, &Options::default()).unwrap()
 }
 
-fn written(bake: Bake, limits: &MapLimits) -> Written {
+/// The room to an error of 1, and of 2.
+static FINE: LazyLock<Bake> = LazyLock::new(|| baked_to(1.0, room()));
+static COARSE: LazyLock<Bake> = LazyLock::new(|| baked_to(2.0, room()));
+/// With their maps.
+static FINE_MAPS: LazyLock<Written> = LazyLock::new(|| written(&FINE, &MapLimits::default()));
+static COARSE_MAPS: LazyLock<Written> = LazyLock::new(|| written(&COARSE, &MapLimits::default()));
+
+fn written<'a>(bake: &'a Bake, limits: &MapLimits) -> Written<'a> {
     let maps = bake.light_maps(limits, &|_, _| {});
     let look = Exposure::new(SCALE);
     let glb = mapped_glb(bake.scene(), &maps, &look).unwrap();
     let name = |k: usize, _: Option<usize>, ending: &str| format!("room.map-{k}.{ending}");
     let index = maps::index(bake.scene(), &maps, &glb, &look, true, &name).unwrap();
-    let folder = tempfile::tempdir().unwrap();
-    for (k, page) in maps.pages.iter().enumerate() {
-        let exr = maps::to_exr(page, index.lux_per_unit, Precision::Half).unwrap();
-        std::fs::write(folder.path().join(name(k, None, "exr")), exr).unwrap();
-    }
-    std::fs::write(folder.path().join("room.glb"), &glb.bytes).unwrap();
-    let index = serde_json::to_value(&index).unwrap();
-    Written {
-        pages: file::pages(folder.path(), &index),
+    let mut file = Written {
         bake,
         maps,
         glb,
-        index,
-        folder,
-    }
+        index: serde_json::to_value(&index).unwrap(),
+        pages: Vec::new(),
+    };
+    file.pages = file::pages(file.folder().path(), &file.index);
+    file
 }
 
-impl Written {
+impl Written<'_> {
+    /// A folder with the room and its pages.
+    fn folder(&self) -> TempDir {
+        let folder = tempfile::tempdir().unwrap();
+        let names = self.index["pages"].as_array().unwrap().iter();
+        let unit = self.index["lux_per_unit"].as_f64().unwrap();
+        for (page, name) in self.maps.pages.iter().zip(names) {
+            let exr = maps::to_exr(page, unit, Precision::Half).unwrap();
+            std::fs::write(folder.path().join(name["exr"].as_str().unwrap()), exr).unwrap();
+        }
+        std::fs::write(folder.path().join("room.glb"), &self.glb.bytes).unwrap();
+        folder
+    }
+
     fn triangles(&self) -> Vec<Mapped> {
         file::triangles(&self.glb.bytes, &self.index)
     }
@@ -156,7 +162,7 @@ fn mean(off: &[(String, f64)]) -> f64 {
 
 #[test]
 fn light_read_back_is_what_probe_finds() {
-    let file = written(solved(room(), 1.0), &MapLimits::default());
+    let file = &*FINE_MAPS;
     let stated = file.maps.baked.interpolation.unwrap();
     assert!(stated.is_met(), "{stated:?}");
     let triangles = file.triangles();
@@ -190,7 +196,10 @@ fn light_read_back_is_what_probe_finds() {
 
 #[test]
 fn three_js_shows_what_probe_finds() {
-    let file = written(solved(room(), 1.0), &MapLimits::default());
+    if !three::is_there() {
+        return;
+    }
+    let file = &*FINE_MAPS;
     let triangles = file.triangles();
     let all: Vec<&Mapped> = triangles.iter().collect();
     let points = random(&all, 1000);
@@ -198,9 +207,7 @@ fn three_js_shows_what_probe_finds() {
         .iter()
         .map(|p| (p.of.entry, p.at, shown::facing(p.of)))
         .collect();
-    let Some(seen) = shown::shown(file.folder.path(), &file.index, &places) else {
-        return;
-    };
+    let seen = shown::shown(file.folder().path(), &file.index, &places);
     let places: Vec<_> = points.iter().map(|p| (p.at, p.normal)).collect();
     let probed = file.bake.probe(&places);
     let off = seen.iter().zip(probed).map(|(rgb, probed)| {
@@ -217,9 +224,9 @@ fn three_js_shows_what_probe_finds() {
 
 #[test]
 fn the_stated_error_is_what_the_audit_measures() {
-    let file = written(solved(room(), 1.0), &MapLimits::default());
-    let reference = PathReference::new(&file.bake, 200, 4096, 5);
-    let report = Report::of_maps(&file.bake, &file.maps, &reference);
+    let file = &*FINE_MAPS;
+    let reference = PathReference::new(file.bake, 200, 4096, 5);
+    let report = Report::of_maps(file.bake, &file.maps, &reference);
     assert!(
         report.de2000.mean.low < file.bake.error_of(&file.maps.baked).unwrap(),
         "{report:?}"
@@ -229,7 +236,7 @@ fn the_stated_error_is_what_the_audit_measures() {
 /// Charts of the tube meet over edges across which its light runs on.
 #[test]
 fn seams_do_not_show() {
-    let file = written(solved(room(), 1.0), &MapLimits::default());
+    let file = &*FINE_MAPS;
     let triangles = file.triangles();
     let tube: Vec<&Mapped> = triangles
         .iter()
@@ -271,7 +278,7 @@ fn seams_do_not_show() {
 
 #[test]
 fn sets_that_are_in_use_stay() {
-    let file = written(solved(room(), 2.0), &MapLimits::default());
+    let file = &*COARSE_MAPS;
     let (json, _) = file::chunks(&file.glb.bytes);
     let (input, _) = (file::chunks(&room::room()).0, ());
     let sets = |primitive: &Value| {
@@ -309,7 +316,7 @@ fn sets_that_are_in_use_stay() {
 /// In the glb, base colour x texel x intensity / pi is the exposed radiosity.
 #[test]
 fn the_glb_shows_the_radiosity() {
-    let file = written(solved(room(), 1.0), &MapLimits::default());
+    let file = &*FINE_MAPS;
     let (json, bin) = file::chunks(&file.glb.bytes);
     let materials = json["materials"].as_array().unwrap();
     let map = &materials
@@ -348,7 +355,8 @@ fn any_number_of_threads_writes_the_same_bytes() {
             .build()
             .unwrap();
         pool.install(|| {
-            let file = written(solved(room(), 2.0), &MapLimits::default());
+            let bake = baked_to(2.0, room());
+            let file = written(&bake, &MapLimits::default());
             let exr = maps::to_exr(&file.maps.pages[0], 1.0, Precision::Half).unwrap();
             (file.glb.bytes, exr, file.index.to_string())
         })
@@ -362,7 +370,7 @@ fn small_pages_are_several() {
         page: 32,
         ..MapLimits::default()
     };
-    let file = written(solved(room(), 2.0), &limits);
+    let file = written(&COARSE, &limits);
     assert!(file.pages.len() > 1);
     assert!(file.pages.iter().all(|p| p.width <= 32 && p.height <= 32));
     let triangles = file.triangles();
@@ -373,13 +381,12 @@ fn small_pages_are_several() {
 /// No more texels than are allowed, whichever charts ask for them, save what each needs in any case.
 #[test]
 fn texels_stay_within_their_number() {
-    let bake = solved(room(), 1.0);
     let texels = |limit: usize| {
         let limits = MapLimits {
             texels: Some(limit),
             ..MapLimits::default()
         };
-        let maps = bake.light_maps(&limits, &|_, _| {});
+        let maps = FINE.light_maps(&limits, &|_, _| {});
         let used = |page: &haarlight::lightmap::MapPage| {
             page.surfaces.iter().filter(|s| **s != u32::MAX).count()
         };
@@ -422,7 +429,7 @@ fn edges_of_shadows_have_no_steps() {
     room.polygon(&corners, black);
     let lamp = dvec3(0.0, 2.0, 0.0);
     room.point(lamp, 1000.0);
-    let bake = solved(room.scene(), 1.0);
+    let bake = baked_to(1.0, room.scene());
     let maps = bake.light_maps(&MapLimits::default(), &|_, _| {});
     let mesh = bake.mesh();
     let at = |p: DVec3| {
@@ -459,18 +466,16 @@ fn edges_of_shadows_have_no_steps() {
 
 #[test]
 fn indirect_light_is_what_lamps_do_not_send_straight() {
-    let bake = solved(room(), 1.0);
-    let all = bake.light_maps(&MapLimits::default(), &|_, _| {});
     let limits = MapLimits {
         indirect: true,
         ..MapLimits::default()
     };
-    let indirect = bake.light_maps(&limits, &|_, _| {});
+    let indirect = FINE.light_maps(&limits, &|_, _| {});
     let sum = |maps: &LightMaps| {
         let texels = maps.baked.surfaces.iter().flat_map(|s| &s.vertices);
         texels.map(|v| f64::from(v.irradiance[1])).sum::<f64>()
     };
-    let share = sum(&indirect) / sum(&all);
+    let share = sum(&indirect) / sum(&FINE_MAPS.maps);
     // The paint reflects about half: direct light is about half of all.
     assert!((0.2..0.8).contains(&share), "{share}");
 }
@@ -479,9 +484,10 @@ fn indirect_light_is_what_lamps_do_not_send_straight() {
 /// light maps on unlit materials must.
 #[test]
 fn the_validator_has_nothing_to_say() {
-    let file = written(solved(room(), 2.0), &MapLimits::default());
+    let file = &*COARSE_MAPS;
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tools/validate.mjs");
-    let path = file.folder.path().join("room.glb");
+    let folder = file.folder();
+    let path = folder.path().join("room.glb");
     let Ok(output) = Command::new("node").arg(script).arg(path).output() else {
         eprintln!("skipped: node is not installed");
         return;

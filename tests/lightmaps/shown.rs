@@ -9,12 +9,11 @@ use std::path::Path;
 const PAGE: &str = include_str!("shown.html");
 
 /// What three.js shows at points of triangles, which are given by the number of their entry in the index: linear sRGB.
-/// None: it is not there.
 pub(crate) fn shown(
     folder: &Path,
     index: &Value,
     points: &[(usize, DVec3, DVec3)],
-) -> Option<Vec<[f64; 3]>> {
+) -> Vec<[f64; 3]> {
     let file = |name: &str| {
         url(
             "application/octet-stream",
@@ -30,12 +29,12 @@ pub(crate) fn shown(
         "pages": pages.map(|p| file(p["exr"].as_str().unwrap())).collect::<Vec<_>>(),
         "index": index, "points": rows.collect::<Vec<_>>(),
     });
-    let seen: Vec<[f64; 4]> = three::seen(PAGE, &input)?;
+    let seen: Vec<[f64; 4]> = three::seen(PAGE, &input);
     let colors = seen.into_iter().map(|[r, g, b, a]| {
         assert_eq!(a, 1.0, "nothing was drawn there");
         [r, g, b]
     });
-    Some(colors.collect())
+    colors.collect()
 }
 
 /// Normal of a triangle out of the side that is lit.

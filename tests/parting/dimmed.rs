@@ -6,9 +6,8 @@ use serde_json::json;
 const PAGE: &str = include_str!("dimmed.html");
 const README: &str = include_str!("../../README.md");
 
-/// Colour that three.js shows in the middle of triangles of a file whose layers are dimmed, and what it should be. None: it is not
-/// there.
-pub(crate) fn seen(glb: &[u8], dim: &[f64]) -> Option<Vec<([f64; 3], [f64; 3])>> {
+/// Colour that three.js shows in the middle of triangles of a file whose layers are dimmed, and what it should be.
+pub(crate) fn seen(glb: &[u8], dim: &[f64]) -> Vec<([f64; 3], [f64; 3])> {
     let input = json!({ "glb": three::url("application/octet-stream", glb), "wanted": dim });
     three::seen(&PAGE.replace("SNIPPET", &snippet()), &input)
 }

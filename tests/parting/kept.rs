@@ -1,31 +1,25 @@
 //! Layers in files for NumPy and in caches.
 
-use super::{glanced, haarlight, layers, loaded, scenes, sums_up, two_lamps};
+use super::{FURNISHED, TWO_LAMPS, glanced, haarlight, layers, scenes, sums_up, two_lamps};
 use crate::common::every_effect::small;
 use haarlight::gather::{Baked, BakedSurface};
 use haarlight::keep::Relighter;
 use haarlight::output::npz;
-use haarlight::scene::Scene;
 use haarlight::scene::effects::EffectKind;
-use haarlight::solve::{Bake, Settings};
-use std::path::Path;
 
 /// Spectra of the layers add up to those of the whole; they are in the file under the names that it says.
 #[test]
 fn spectra_of_layers_add_up() {
     // What fluoresces gives out light of every layer.
-    for (name, scene) in [
-        ("furnished", loaded("furnished.glb", None)),
-        (
-            "fluorescent",
-            small(&[EffectKind::Sky, EffectKind::Fluorescence]),
-        ),
+    let fluorescent = small(&[EffectKind::Sky, EffectKind::Fluorescence]);
+    for (name, (bake, baked)) in [
+        ("furnished", &*FURNISHED),
+        ("fluorescent", &glanced(fluorescent)),
     ] {
-        let (bake, baked) = glanced(scene);
-        let whole = bake.radiosity_spectra(&baked);
-        let names = &layers(&bake).names;
+        let whole = bake.radiosity_spectra(baked);
+        let names = &layers(bake).names;
         let each: Vec<_> = (0..names.len())
-            .map(|k| bake.layer_spectra(&baked, k))
+            .map(|k| bake.layer_spectra(baked, k))
             .collect();
         let (mut worst, mut most) = (0.0_f64, 0.0_f64);
         for (s, spectra) in whole.iter().enumerate() {
@@ -41,7 +35,7 @@ fn spectra_of_layers_add_up() {
             names.len() > 1 && worst <= 1e-6 * most,
             "{name}: {worst} of {most}"
         );
-        assert!(bake.layer_spectra(&baked, names.len()).is_empty());
+        assert!(bake.layer_spectra(baked, names.len()).is_empty());
         let mut file = Vec::new();
         let layer = |k: usize| each[k].clone();
         let parts: npz::LayerSpectra = (names, &layer);
@@ -54,23 +48,6 @@ fn spectra_of_layers_add_up() {
             assert!(file.windows(first.len()).any(|w| w == first), "{k}");
         }
     }
-}
-
-/// A cache of a bake with layers, as a file.
-fn cached(scene: Scene, path: &Path) -> (Bake, Baked) {
-    let mut scene = scene;
-    scene.part_lamps().unwrap();
-    let settings = Settings {
-        error: 1.0,
-        rounds: 3,
-        ..Settings::default()
-    };
-    let mut bake = Bake::new(scene, settings);
-    bake.keep();
-    bake.run();
-    let baked = bake.baked(&|_, _| {});
-    bake.write_cache(&baked, path, u64::MAX).unwrap();
-    (bake, baked)
 }
 
 /// All numbers of a layer.
@@ -87,19 +64,20 @@ fn layer(surfaces: &[BakedSurface], k: usize) -> impl Iterator<Item = f64> + '_ 
 fn layers_are_relit() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("cache");
-    let (bake, baked) = cached(two_lamps(), &path);
+    let (bake, baked) = &*TWO_LAMPS;
+    bake.write_cache(baked, &path, u64::MAX).unwrap();
     let mut relighter = Relighter::open(&path, two_lamps()).unwrap();
     let same = relighter.relight().unwrap();
     assert!(!same.record.changed);
     sums_up(relighter.bake(), &same.baked, "relit");
-    let count = layers(&bake).names.len();
+    let count = layers(bake).names.len();
     for k in 0..count {
         let most = layer(&baked.surfaces, k).fold(0.0, f64::max);
         let both = layer(&baked.surfaces, k).zip(layer(&same.baked.surfaces, k));
         both.for_each(|(a, b)| assert!((a - b).abs() <= 2e-5 * most, "{k}: {a} {b}"));
     }
 
-    let name = layers(&bake).names[1].clone();
+    let name = layers(bake).names[1].clone();
     let mut dimmed = two_lamps();
     dimmed.dim(&name, 0.5).unwrap();
     relighter.change(dimmed).unwrap();
@@ -109,7 +87,7 @@ fn layers_are_relit() {
     for k in 0..count {
         let share = if k == 1 { 0.5 } else { 1.0 };
         let sum = |baked: &Baked| layer(&baked.surfaces, k).sum::<f64>();
-        let ratio = sum(&relit.baked) / (share * sum(&baked));
+        let ratio = sum(&relit.baked) / (share * sum(baked));
         assert!((ratio - 1.0).abs() < 0.01, "{k}: {ratio}");
     }
 

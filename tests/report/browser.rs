@@ -28,15 +28,19 @@ pub(crate) struct Browser {
 }
 
 impl Browser {
-    /// Starts the browser; none if there is none.
-    pub(crate) fn start() -> Option<Self> {
+    /// The name of a browser that is there.
+    pub(crate) fn program() -> Option<&'static str> {
         let there = |name: &&str| {
             let found = Command::new(name).arg("--version").output();
             found.is_ok_and(|output| output.status.success())
         };
-        let program = ["chromium", "chromium-browser", "google-chrome"]
-            .into_iter()
-            .find(there)?;
+        let names = ["chromium", "chromium-browser", "google-chrome"];
+        names.into_iter().find(there)
+    }
+
+    /// Starts the browser; none if there is none.
+    pub(crate) fn start() -> Option<Self> {
+        let program = Self::program()?;
         let profile = tempfile::tempdir().unwrap();
         let mut child = Command::new("sh")
             .args(["-c", START, program, profile.path().to_str()?])

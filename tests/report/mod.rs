@@ -7,8 +7,9 @@ use browser::{Browser, CANVAS};
 use flate2::read::GzDecoder;
 use serde_json::Value;
 use std::io::Read;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::Command;
+use std::sync::LazyLock;
 
 /// A Cornell box may take this much, bytes.
 const MOST: usize = 1_500_000;
@@ -17,11 +18,15 @@ fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
 }
 
-/// A folder with the page and the log of a bake.
+/// The page of a bake, its log, and the file.
 struct Reported {
-    folder: tempfile::TempDir,
     html: String,
+    log: String,
+    glb: Vec<u8>,
 }
+
+/// Of the Cornell box at the default error, once for all tests.
+static CORNELL: LazyLock<Reported> = LazyLock::new(|| Reported::new("cornell", "0.5"));
 
 impl Reported {
     fn new(room: &str, error: &str) -> Self {
@@ -55,13 +60,23 @@ impl Reported {
             .output()
             .unwrap();
         assert_eq!(output.status.code(), Some(0), "{output:?}");
-        let page = folder.path().join(format!("{room}.report.html"));
-        let html = std::fs::read_to_string(page).unwrap();
-        Self { folder, html }
+        let read = |name: &str| std::fs::read(folder.path().join(name)).unwrap();
+        let text = |name: &str| String::from_utf8(read(name)).unwrap();
+        Self {
+            html: text(&format!("{room}.report.html")),
+            log: text("log.jsonl"),
+            glb: read(&format!("{room}.baked.glb")),
+        }
     }
 
-    fn page(&self, room: &str) -> PathBuf {
-        self.folder.path().join(format!("{room}.report.html"))
+    /// Opens the page; the folder that it lies in.
+    fn open(&self, browser: &mut Browser) -> tempfile::TempDir {
+        let folder = tempfile::tempdir().unwrap();
+        let page = folder.path().join("report.html");
+        std::fs::write(&page, &self.html).unwrap();
+        browser.open(&page);
+        browser.wait_for("document.documentElement?.dataset.ready === 'yes'");
+        folder
     }
 
     /// The text of a script element.
@@ -100,7 +115,7 @@ fn base64(text: &str) -> Vec<u8> {
 
 #[test]
 fn the_page_is_whole_small_and_says_what_the_log_says() {
-    let reported = Reported::new("cornell", "0.5");
+    let reported = &*CORNELL;
     let html = &reported.html;
     assert!(html.len() < MOST, "{} bytes", html.len());
     // Nothing is asked for from anywhere; the policy forbids what anyone might add.
@@ -114,8 +129,7 @@ fn the_page_is_whole_small_and_says_what_the_log_says() {
         }
     }
 
-    let log = std::fs::read_to_string(reported.folder.path().join("log.jsonl")).unwrap();
-    let records: Vec<Value> = log
+    let records: Vec<Value> = (reported.log)
         .lines()
         .map(|l| serde_json::from_str(l).unwrap())
         .collect();
@@ -138,9 +152,8 @@ fn the_page_is_whole_small_and_says_what_the_log_says() {
             .ends_with(".html")
     );
 
-    let glb = std::fs::read(reported.folder.path().join("cornell.baked.glb")).unwrap();
     assert!(
-        reported.opened("glb") == glb,
+        reported.opened("glb") == reported.glb,
         "the room in the page is not the file"
     );
     let light = &data["light"];
@@ -295,17 +308,13 @@ fn lamps_are_dimmed_in_the_page() {
     }
     assert!(2 * lit > count, "{lit} of {count}");
     // Without layers there is neither byte nor slider.
-    assert_eq!(
-        Reported::new("cornell", "5").data()["light"]["layers"],
-        serde_json::json!([])
-    );
+    assert_eq!(CORNELL.data()["light"]["layers"], serde_json::json!([]));
 
     let Some(mut browser) = Browser::start() else {
         eprintln!("SKIPPED: no chromium here, the page was not opened (apt-get install chromium)");
         return;
     };
-    browser.open(&reported.page("two-rooms"));
-    browser.wait_for("document.documentElement?.dataset.ready === 'yes'");
+    let _folder = reported.open(&mut browser);
     let first = browser.pixels();
     browser.run(&format!("{CANVAS}.focus()"));
     browser.press("Enter", "Enter", 13);
@@ -486,9 +495,7 @@ fn the_page_lives_in_a_browser() {
         eprintln!("SKIPPED: no chromium here, the page was not opened (apt-get install chromium)");
         return;
     };
-    let reported = Reported::new("cornell", "0.5");
-    browser.open(&reported.page("cornell"));
-    browser.wait_for("document.documentElement?.dataset.ready === 'yes'");
+    let _folder = CORNELL.open(&mut browser);
 
     // The picture is neither black nor of one colour.
     let first = browser.pixels();

@@ -9,17 +9,19 @@ use std::path::{Path, PathBuf};
 
 const DIGITS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
 
-/// What a page tells in `window.seen`; MAP in it stands for the modules, INPUT for what it is given. None: there is no browser, or no
-/// module.
-pub(crate) fn seen<T: DeserializeOwned>(page: &str, input: &Value) -> Option<T> {
-    let Some(modules) = folder() else {
-        eprintln!("skipped: the npm module three is not installed");
-        return None;
-    };
-    let Some(mut browser) = Browser::start() else {
-        eprintln!("skipped: no Chromium");
-        return None;
-    };
+/// Are the module and a browser there? If not, it says that a test is skipped.
+pub(crate) fn is_there() -> bool {
+    let there = folder().is_some() && Browser::program().is_some();
+    if !there {
+        eprintln!("skipped: the npm module three or Chromium is not installed");
+    }
+    there
+}
+
+/// What a page tells in `window.seen`; MAP in it stands for the modules, INPUT for what it is given.
+pub(crate) fn seen<T: DeserializeOwned>(page: &str, input: &Value) -> T {
+    let modules = folder().expect("the module is there");
+    let mut browser = Browser::start().expect("a browser is there");
     let page = page
         .replace("MAP", &imports(&modules).to_string())
         .replace("INPUT", &input.to_string());
@@ -30,7 +32,7 @@ pub(crate) fn seen<T: DeserializeOwned>(page: &str, input: &Value) -> Option<T> 
     browser.wait_for("typeof window.seen === 'string'");
     let seen = serde_json::from_str(&browser.run("window.seen")).unwrap();
     assert!(browser.faults().is_empty(), "{:#?}", browser.faults());
-    Some(seen)
+    seen
 }
 
 /// Bytes as an address.

@@ -287,11 +287,8 @@ fn interrupted_it_leaves_nothing_behind() {
 #[test]
 fn stopped_saved_and_gone_on_with() {
     let program = Program::serve("cornell", &["--error", "0.1"]);
-    program.wait("a round", |s| {
-        s["rounds"].as_array().is_some_and(|r| !r.is_empty())
-    });
     assert_eq!(program.post("/stop", "").status, 202);
-    let state = program.wait("stop", |s| s["doing"] == "stopped");
+    let state = program.stopped_after(1);
     let rounds = state["rounds"].as_array().unwrap().len();
     assert_eq!(
         state["fine"], false,
@@ -329,8 +326,9 @@ fn stopped_saved_and_gone_on_with() {
     let rough = whole.mean_lux();
     assert!(rough > 0.0 && whole.values.iter().flatten().all(|x| x.is_finite()));
 
-    // Saved as it stands, which does not end it.
+    // Saved as it stands, which does not end it; a stop ends the looks at vertices.
     assert_eq!(program.post("/save", "").status, 202);
+    assert_eq!(program.post("/stop", "").status, 202);
     let state = program.wait("save", |s| !s["saved"].is_null());
     assert_eq!(state["saved"][0], "cornell.baked.glb");
     let saved = program.folder.path().join("cornell.baked.glb");
@@ -469,10 +467,8 @@ fn a_dark_room_is_a_room() {
 /// lamp that was dark can be lit again only by solving anew.
 #[test]
 fn changes_before_the_end_and_lamps_that_were_dark() {
-    let program = Program::serve("two-rooms", &["--error", "0.05"]);
-    let state = program.wait("a round", |s| {
-        s["rounds"].as_array().is_some_and(|r| !r.is_empty())
-    });
+    let program = Program::serve("two-rooms", &["--error", "0.3"]);
+    let state = program.stopped_after(1);
     let room: Value = serde_json::from_slice(&program.get("/room").body).unwrap();
     let lamps = room["room"]["lamps"].as_array().unwrap();
     let names: Vec<&str> = lamps
@@ -485,6 +481,7 @@ fn changes_before_the_end_and_lamps_that_were_dark() {
     };
     assert!(names.iter().any(|n| *n != first), "{names:?}");
     let body = json!({ "dim": { of: { first: 0 } } }).to_string();
+    program.post("/go", "");
     assert_eq!(program.post("/change", &body).status, 202);
     let relit = program.wait("relit", |s| !s["relit"].is_null());
     assert_eq!(relit["fine"], false);

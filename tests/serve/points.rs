@@ -7,11 +7,7 @@ use serde_json::{Value, json};
 #[test]
 fn points_are_read_with_their_spectra() {
     let program = Program::serve("cornell", &["--error", "0.1"]);
-    program.wait("two rounds", |s| {
-        s["rounds"].as_array().is_some_and(|r| r.len() > 1)
-    });
-    program.post("/stop", "");
-    program.wait("stop", |s| s["doing"] == "stopped");
+    program.stopped_after(2);
     let room: Value = serde_json::from_slice(&program.get("/room").body).unwrap();
     let observer = &room["room"]["observer"];
     let rough = read_parts(&program, observer, false);

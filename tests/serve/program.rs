@@ -156,6 +156,18 @@ impl Program {
         self.wait("done", |s| s["doing"] == "done")
     }
 
+    /// Stops it after so many rounds, or one or two more.
+    pub(crate) fn stopped_after(&self, rounds: usize) -> Value {
+        loop {
+            self.post("/stop", "");
+            let state = self.wait("stop", |s| s["doing"] == "stopped");
+            if state["rounds"].as_array().unwrap().len() >= rounds {
+                return state;
+            }
+            self.post("/go", "");
+        }
+    }
+
     /// Interrupts it as Ctrl-C does; how it ended, and after how long.
     pub(crate) fn interrupt(mut self) -> (ExitStatus, Duration, tempfile::TempDir) {
         let start = Instant::now();
