@@ -424,7 +424,7 @@ fn calibrate(path: &Path, points: usize, most_paths: usize) -> Vec<String> {
         EffectKind::Fluorescence,
     ];
     let error = if by_rays.into_iter().any(|kind| plan.runs(kind)) {
-        2.0
+        1.0
     } else {
         Settings::default().error
     };

@@ -196,11 +196,15 @@ fn untimed(value: &mut Value) {
     }
 }
 
-/// Through the program: 1, 2 and 8 threads, with and without progress on the terminal.
+/// Through the program: 1, 2 and 8 threads, a second run, with and without progress on the terminal.
 #[test]
 fn the_program_writes_the_same_bytes() {
     let one = by_the_program("cornell.glb", &["--threads", "1"]);
-    for options in [&["--threads", "2"][..], &["--threads", "8", "-q"]] {
+    for options in [
+        &["--threads", "2"][..],
+        &["--threads", "8"],
+        &["--threads", "1", "-q"],
+    ] {
         let other = by_the_program("cornell.glb", options);
         assert_eq!(one.len(), other.len(), "{options:?}");
         for (k, (a, b)) in one.iter().zip(&other).enumerate() {

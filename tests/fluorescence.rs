@@ -578,7 +578,8 @@ fn a_base_colour_leaves_room() {
 #[test]
 fn the_path_tracer_agrees() {
     let bake = baked(brightened(), 1.0);
-    let reference = Traced::new(&bake, 150, 1 << 14, 3);
+    // As many paths as the default asks for.
+    let reference = Traced::new(&Bake::new(brightened(), settings(0.5)), 150, 1 << 14, 3);
     let points = Report::against(&bake, &reference);
     let file = Report::of_file(&bake, &bake.baked(&|_, _| {}), &reference);
     for report in [&points, &file] {
