@@ -9,6 +9,9 @@ use std::f64::consts::PI;
 
 /// A part is weighed in pieces that are no longer than this share of their distance, at most so many along its side and so many in all.
 const LENGTH: f64 = 0.5;
+/// The same of what they bring at the most, which need be known only roughly: leaves take from it how many points they look at. With [`LENGTH`] a curtained room
+/// (`--error 4`) takes 16.3 CPU s for 10.7, and one with panes 19.3 for 15.6; by either their leaves take as many points within a seventh.
+const ROUGH: f64 = 2.0;
 const ALONG: f64 = 16.0;
 const PIECES: usize = 256;
 /// Pieces along a side at least, if there are few parts, where one corner is so many times as bright as another: of a window that is half
@@ -156,7 +159,7 @@ impl Openings {
         let shown = self.place(point, normal) * self.parts.len();
         for (k, part) in self.parts.iter().enumerate() {
             let pieces = Pieces {
-                along: self.along(k, point, [LENGTH, 1.0]),
+                along: self.along(k, point, [ROUGH, 1.0]),
                 ..Pieces::default()
             };
             let shown = f64::from(self.shown[shown + k]);
