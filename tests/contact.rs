@@ -249,7 +249,7 @@ fn the_gap_behind_a_panel_is_dark() {
 }
 
 /// White walls send light into the gap from one to the other, but not far: twenty times its width from the edge there is none. While paths took the light of
-/// leaves after eight steps, a fifteenth of the light beside the panel was there.
+/// leaves after eight steps, a fourteenth of the light beside the panel was there.
 #[test]
 fn deep_in_a_gap_it_is_dark_whatever_the_paint() {
     let bake = behind_a_panel(0.9);
