@@ -1,11 +1,11 @@
 //! A bake that is stopped between rounds and resumed ends with the same bytes; what does not belong is refused.
 
 use crate::common::every_effect::{self, EFFECTS};
+use crate::common::garbled;
 
 use haarlight::output::{Exposure, Writing, baked_glb, npz};
 use haarlight::scene::{Options, Scene};
 use haarlight::solve::{Bake, Settings};
-use haarlight::store::container;
 use proptest::prelude::*;
 use std::path::Path;
 use std::process::Command;
@@ -203,30 +203,15 @@ proptest! {
     /// Whatever stands in a file, even under a right checksum, is taken or refused, and never a fault.
     #[test]
     fn garbled_files_do_no_harm(
-        changes in prop::collection::vec((any::<prop::sample::Index>(), any::<[u8; 8]>(), 1_usize..9), 1..4),
+        changes in garbled::changes(),
         cut in prop::option::of(any::<prop::sample::Index>()),
         early in any::<bool>(),
         signed in any::<bool>(),
     ) {
-        let mut bytes = SMALL.clone();
-        bytes.truncate(bytes.len() - 8);
-        for (at, with, count) in changes {
-            // Half of the cases where the lengths of the first lists are.
-            let at = at.index(if early { 4096 } else { bytes.len() });
-            for (k, x) in with.iter().take(count).enumerate() {
-                if let Some(byte) = bytes.get_mut(at + k) {
-                    *byte = *x;
-                }
-            }
-        }
-        if let Some(cut) = cut {
-            bytes.truncate(cut.index(bytes.len()));
-        }
+        // Half of the cases where the lengths of the first lists are.
+        let mut bytes = garbled::garbled(&SMALL, changes, early, cut);
         if signed {
-            bytes.extend([0; 8]);
-            let sum = container::checksum(&bytes);
-            bytes.truncate(bytes.len() - 8);
-            bytes.extend(sum.to_le_bytes());
+            garbled::sign(&mut bytes);
         }
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("c");

@@ -4,6 +4,7 @@ pub(crate) mod built;
 pub(crate) mod daylit;
 pub(crate) mod desk;
 pub(crate) mod every_effect;
+pub(crate) mod garbled;
 pub(crate) mod traced;
 
 use haarlight::scene::document::Document;

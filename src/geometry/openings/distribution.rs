@@ -9,11 +9,11 @@ use std::f64::consts::PI;
 
 /// A part is weighed in pieces that are no longer than this share of their distance, at most so many along its side and so many in all.
 const LENGTH: f64 = 0.5;
-/// The same of what they bring at the most, which need be known only roughly: leaves take from it how many points they look at. With [`LENGTH`] a curtained room
-/// (`--error 4`) takes 16.3 CPU s for 10.7, and one with panes 19.3 for 15.6; by either their leaves take as many points within a seventh.
-const ROUGH: f64 = 2.0;
 const ALONG: f64 = 16.0;
 const PIECES: usize = 256;
+/// [`LENGTH`] of what they bring at the most, which need be known only roughly: leaves take from it how many points they look at. With [`LENGTH`] a curtained room
+/// (`--error 4`) takes 16.3 CPU s for 10.7, and one with panes 19.3 for 15.6; by either their leaves take as many points within a seventh.
+const ROUGH: f64 = 2.0;
 /// Pieces along a side at least, if there are few parts, where one corner is so many times as bright as another: of a window that is half
 /// below the horizon each is above it or not. With one, points that see a strip of sky above black ground were 4 % off; with so many
 /// everywhere, rays lie less evenly, and points are off by .3 % that are else by .1.
