@@ -117,6 +117,10 @@ pub(super) fn verdict(v: &VerdictRecord, audit: Option<&Report>) -> String {
 fn between_vertices(i: &Interpolation) -> String {
     let excess = match (i.is_met(), i.capped) {
         (true, _) => String::new(),
+        _ if i.mean <= i.allowed => format!(
+            " (light bends by {:.3}, more than {:.3})",
+            i.bends, i.may_bend
+        ),
         (false, Some(most)) => format!(
             " (more than {:.3}, with the {most} vertices allowed)",
             i.allowed

@@ -43,7 +43,8 @@ pub struct Baked {
 }
 
 /// How far light between the vertices of a file is from what gathering there finds: colour differences (CIEDE2000 of a
-/// white surface's light under the adaptation white) at random points by area, covered points left out.
+/// white surface's light under the adaptation white) at random points by area, covered points left out. What light at the vertices differs by
+/// by chance is a part of it; what gathering at the points does is not.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 #[non_exhaustive]
 pub struct Interpolation {
@@ -51,22 +52,31 @@ pub struct Interpolation {
     pub rms: f64,
     /// Mean.
     pub mean: f64,
+    /// By how much light bends between vertices: the mean without what chance alone may make of it. Low where gathered light has much of that.
+    pub bends: f64,
     /// Value that 95 % of the points do not exceed.
     pub p95: f64,
-    /// Root of the mean variance of gathered light, which is not counted.
+    /// Root of the mean variance of gathered light at the points, which is not counted.
     pub noise: f64,
     /// Points.
     pub points: usize,
-    /// What the mean may be: its share of the error asked for, which is also a mean.
+    /// What the mean may be: what light at points leaves of the error asked for, which is also a mean.
     pub allowed: f64,
+    /// By how much light may bend: its share of that error.
+    pub may_bend: f64,
     /// The number of vertices allowed, if the mesh has reached it.
     pub capped: Option<usize>,
 }
 
 impl Interpolation {
-    /// Is the mean within what is allowed?
+    /// Is the mean within what is allowed, and what light bends by?
     pub fn is_met(&self) -> bool {
-        self.mean <= self.allowed
+        self.mean <= self.allowed && self.bends <= self.may_bend
+    }
+
+    /// How many times what is allowed the error is.
+    pub(crate) fn excess(&self) -> f64 {
+        (self.mean / self.allowed).max(self.bends / self.may_bend)
     }
 }
 

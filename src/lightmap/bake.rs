@@ -14,7 +14,7 @@ use crate::gather::{Baked, BakedSurface, LayerLanes, MapPlace, SurfaceResponse};
 use crate::mesh::looks::Looks;
 use crate::mesh::measure::summed;
 use crate::mesh::turns::Turns;
-use crate::solve::{Bake, Effort, GatherQuality, INTERPOLATION_SHARE};
+use crate::solve::{Bake, Effort, GatherQuality};
 use glam::DVec2;
 use rayon::prelude::*;
 use std::collections::{BTreeMap, HashMap};
@@ -72,8 +72,8 @@ impl Bake {
             page: limits.page,
         };
         let mut growth = LightmapGrowth::new(self, all, Sampler::new(looks), budget);
-        let allowed = INTERPOLATION_SHARE * self.settings().error;
-        growth.unknown = allowed * allowed;
+        let allowed = self.error_between();
+        growth.unknown = allowed[1] * allowed[1];
         growth.begin(progress);
         // What every chart needs in any case comes on top.
         growth.budget.looks = growth.sampler.looks.len() + (MOST_LOOKS * more) as usize;
@@ -84,7 +84,7 @@ impl Bake {
         let samples = growth.compared(&points, &self.placed(&growth, &Vec::new(), None).0);
         let before = summed(&samples, allowed, None);
         growth.noise = before.noise * before.noise;
-        let mut turns = Turns::new(allowed, area, growth.cells.len(), before);
+        let mut turns = Turns::new(area, growth.cells.len(), before);
         loop {
             let end = growth.grow(turns.aim, progress);
             let points = growth.points(self, turns.turn, progress);
@@ -93,7 +93,7 @@ impl Bake {
             let found = summed(&samples, allowed, None);
             let ended = (end, (limits.late)());
             if turns.is_over(found, growth.cells.len(), ended, growth.sum()) {
-                let smoothed = growth.smooth(allowed, progress);
+                let smoothed = growth.smooth(allowed[1], progress);
                 growth.even_out();
                 let (mut placed, covered) = self.placed(&growth, &smoothed, None);
                 close(self, &growth.charts, &spaces, &mut placed);

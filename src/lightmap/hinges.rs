@@ -129,7 +129,7 @@ mod tests {
         let mut growth = begun(bake);
         let points = growth.points(bake, 0, &|_, _| {});
         let placed = bake.placed(&growth, &Vec::new(), None).0;
-        let noise = summed(&growth.compared(&points, &placed), 1.0, None).noise;
+        let noise = summed(&growth.compared(&points, &placed), [1.0; 2], None).noise;
         growth.noise = noise * noise;
         growth.grow(4.0 * growth.seen_area(), &|_, _| {});
         growth.even_out();

@@ -88,14 +88,14 @@ impl LightmapGrowth<'_> {
                 .look_up(point.chart, point.place.at)
                 .irradiance
                 .map(f64::from);
-            let noise = 0.5 * self.difference(one, two).powi(2);
-            let seen =
-                0.5 * (self.difference(drawn, one).powi(2) + self.difference(drawn, two).powi(2));
-            Some(ErrorSample {
+            let variance = self.shared(point, &cells);
+            let difference = |a, b| self.difference(a, b);
+            Some(ErrorSample::new(
                 cell,
-                square: seen - (1.0 + self.shared(point, &cells)) * noise,
-                noise,
-            })
+                (drawn, [one, two]),
+                variance,
+                difference,
+            ))
         };
         points.iter().enumerate().filter_map(sample).collect()
     }
@@ -132,7 +132,7 @@ impl LightmapGrowth<'_> {
     pub(super) fn learn(&mut self, points: &[TestPoint], samples: &[ErrorSample]) {
         let cells = self.by_chart();
         for sample in samples {
-            let square = sample.square - CHANCE * sample.noise;
+            let square = sample.bend - CHANCE * sample.noise;
             let Some(cell) = self
                 .cell_at(&points[sample.cell], &cells)
                 .filter(|_| square > 0.0)

@@ -6,7 +6,7 @@
 use super::grow::share;
 use super::more_vertices;
 use super::turns::SQUARE;
-use crate::solve::{Bake, GatherQuality, INTERPOLATION_SHARE};
+use crate::solve::{Bake, GatherQuality};
 
 /// Triangles that a vertex adds to a mesh.
 const A_VERTEX: usize = 2;
@@ -21,7 +21,7 @@ impl Bake {
         growth.begin(&|_, _| {});
         let (cells, used) = (growth.cells.all.len(), growth.used());
         let shares: Vec<f64> = growth.cells.all.iter().map(share).collect();
-        let allowed = INTERPOLATION_SHARE * self.settings().error;
+        let [_, allowed] = self.error_between();
         let allowed = SQUARE * allowed * allowed * growth.seen_area();
         let most = match vertices {
             Some(most) => most.saturating_sub(used),

@@ -88,7 +88,12 @@ mod tests {
         let mut growth = bake.growth(GatherQuality::Vertex(Effort::default()), &|| false);
         growth.begin(&|_, _| {});
         let settled = bake.settled(&growth);
-        let noise = summed(&growth.measured(bake, &settled, 0, &|_, _| {}), 1.0, None).noise;
+        let noise = summed(
+            &growth.measured(bake, &settled, 0, &|_, _| {}),
+            [1.0; 2],
+            None,
+        )
+        .noise;
         growth.noise = noise * noise;
         growth.grow(4.0 * growth.seen_area(), &|_, _| {});
         let light = growth.smoothed();

@@ -29,7 +29,7 @@ pub(crate) mod turns;
 mod write;
 
 use crate::gather::Baked;
-use crate::solve::{Bake, Effort, GatherQuality, INTERPOLATION_SHARE};
+use crate::solve::{Bake, Effort, GatherQuality};
 use cells::Cells;
 use grow::MeshGrowth;
 use looks::Looks;
@@ -91,8 +91,8 @@ impl Bake {
     /// [`Bake::baked`] within limits: where these end growing, with the error reached.
     pub fn baked_within(&self, limits: &Limits, progress: &dyn Fn(usize, usize)) -> Baked {
         let mut growth = self.growth(GatherQuality::Vertex(Effort::default()), limits.late);
-        let allowed = INTERPOLATION_SHARE * self.settings().error;
-        growth.allowed = allowed;
+        let allowed = self.error_between();
+        growth.allowed = allowed[1];
         if let Some(vertices) = limits.vertices {
             (growth.most, growth.strict) = (vertices, true);
         }
@@ -112,7 +112,7 @@ impl Bake {
         let mut samples = growth.measured(self, &settled, 0, progress);
         let before = summed(&samples, allowed, None);
         growth.noise = before.noise * before.noise;
-        let mut turns = Turns::new(allowed, area, growth.cells.all.len(), before);
+        let mut turns = Turns::new(area, growth.cells.all.len(), before);
         loop {
             let cells = growth.cells.all.len();
             let end = growth.grow(turns.aim, progress);
@@ -129,7 +129,7 @@ impl Bake {
             );
             let ended = (end, limits.is_late());
             if turns.is_over(interpolation, growth.cells.all.len(), ended, growth.sum()) {
-                let capped = growth.unfinished(allowed * allowed);
+                let capped = growth.unfinished(growth.allowed * growth.allowed);
                 let layers = growth.of_layers(self, &settled, allowed);
                 let mut out = self.write_down(growth, settled);
                 out.layers = layers;

@@ -50,19 +50,17 @@ pub(crate) struct Turns {
     pub(crate) aim: f64,
     /// The number of this turn, from 1.
     pub(crate) turn: u64,
-    allowed: f64,
     /// Number of cells and the measurement when there were last [`GROWN`] times as many as before.
     cells: usize,
     before: Interpolation,
 }
 
 impl Turns {
-    /// Starts with the allowed error (mean CIEDE2000), the area that is seen, and the measurement at a number of cells.
-    pub(crate) fn new(allowed: f64, area: f64, cells: usize, before: Interpolation) -> Self {
+    /// Starts with the area that is seen, and the measurement at a number of cells.
+    pub(crate) fn new(area: f64, cells: usize, before: Interpolation) -> Self {
         Self {
-            aim: SQUARE * allowed * allowed * area,
+            aim: SQUARE * before.may_bend * before.may_bend * area,
             turn: 1,
-            allowed,
             cells,
             before,
         }
@@ -78,7 +76,7 @@ impl Turns {
         sum: f64,
     ) -> bool {
         let has_grown = cells as f64 > GROWN * self.cells as f64;
-        let stalled = self.turn > 1 && has_grown && found.mean > STALLED * self.before.mean;
+        let stalled = self.turn > 1 && has_grown && found.excess() > STALLED * self.before.excess();
         if has_grown {
             (self.cells, self.before) = (cells, found);
         }
@@ -90,7 +88,7 @@ impl Turns {
         {
             return true;
         }
-        let wrong = (found.mean / self.allowed).powi(2);
+        let wrong = found.excess().powi(2);
         self.aim = sum.min(self.aim) * (BELOW / wrong).clamp(STEP, BELOW);
         self.turn += 1;
         false

@@ -2,7 +2,7 @@
 //!
 //! Every path goes on from surface to surface whatever their reflectance, so that black walls count and bright ones do not count twice.
 //! Light from outside lands on everything outside, and next to nothing of it in the room: where there is a sky, a sun or other parallel
-//! light, all surfaces count.
+//! light, all surfaces are lit. What counts of them is what can be looked at, see `views`.
 
 use super::Bake;
 use super::room::Room;
@@ -11,8 +11,9 @@ use crate::hierarchy::{Counted, Frame, LandingPoint, NONE, Tree};
 use crate::link::Sight;
 use rayon::prelude::*;
 
-/// Paths that tell whether anything is dark at all (a few milliseconds), and those that tell what is dark.
-const PATHS: [u32; 2] = [1024, 16_384];
+/// Paths that tell whether anything is dark at all (a few milliseconds), and those that tell what is dark. With 1024 of the first a garage whose walls have outsides, 57 of
+/// 257 m2, was lit throughout; 65,536 of the others tell no more than 32,768 in it and in a home theatre within 2 %.
+const PATHS: [u32; 2] = [4096, 32_768];
 /// Surfaces that a path meets: in closed rooms nearly all light has been everywhere by then.
 const BOUNCES: usize = 5;
 /// The part that counts gets a frame of its own if its half size is between these shares of the file's: single precision places things
@@ -36,8 +37,10 @@ impl Bake {
         let tree = self.tree();
         Averages {
             over: match self.room.is_lit_from_outside() {
-                true => "all surfaces by area, as light comes from outside",
-                false => "surfaces that light of the lamps reaches, by area",
+                true => "all surfaces that can be looked at, by area, as light comes from outside",
+                false => {
+                    "surfaces that light of the lamps reaches and that can be looked at, by area"
+                }
             },
             counted_m2: tree.counted(),
             area_m2: tree.nodes.first().map_or(0.0, |root| root.area),
@@ -51,11 +54,20 @@ impl Room {
         lights.any(|light| light.kind.is_parallel() || light.kind.is_dome())
     }
 
-    /// Which part of a hierarchy counts.
+    /// Which part of a hierarchy counts: what of the light reaches, and of that what anybody can look at.
     pub(super) fn count(&self, tree: &mut Tree) -> Counted {
-        if tree.nodes.is_empty() || self.is_lit_from_outside() {
+        if tree.nodes.is_empty() {
             return Counted::default();
         }
+        let lit = match self.is_lit_from_outside() {
+            true => Counted::default(),
+            false => self.lit(tree),
+        };
+        self.viewed(tree, lit)
+    }
+
+    /// Which part of a hierarchy light of the lamps reaches.
+    fn lit(&self, tree: &mut Tree) -> Counted {
         let grown = tree.grown();
         let mut counted = Counted::default();
         for paths in PATHS {

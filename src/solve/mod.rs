@@ -45,6 +45,7 @@ mod sources;
 mod sums;
 mod threshold_factors;
 mod tinted;
+mod views;
 
 pub(crate) use effort::Effort;
 pub use lists::PatchList;
@@ -91,8 +92,8 @@ const SPECTRUM_SHARE: f64 = 0.2;
 /// Shares of the asked-for error that may be caused by light at points, and by straight lines between the vertices of
 /// the output: their squares add to 1. Equal shares would ask a room whose rounds halve the error for one more round in
 /// one case of six.
-pub(crate) const LIGHT_SHARE: f64 = 0.8;
-pub(crate) const INTERPOLATION_SHARE: f64 = 0.6;
+const LIGHT_SHARE: f64 = 0.8;
+const INTERPOLATION_SHARE: f64 = 0.6;
 /// Why a step without an interrupt always ends in a result.
 pub(crate) const NOBODY: &str = "nobody interrupts it";
 
@@ -335,6 +336,21 @@ impl Bake {
         }
         let past: Vec<Past> = self.rounds.iter().map(Round::past).collect();
         self.goal().verdict(&past)
+    }
+
+    /// The error that light may have between vertices or texels, what it differs by there by chance included: what light at points leaves of the error that was asked
+    /// for, or what it would if it had its share. Then that of light which bends alone, which is seen in patterns.
+    pub(crate) fn error_between(&self) -> [f64; 2] {
+        let asked = self.room.settings.error;
+        let of_light = self
+            .rounds
+            .last()
+            .and_then(|round| round.error.total_de2000.value);
+        let of_light = of_light.map_or(LIGHT_SHARE * asked, |found| found.min(LIGHT_SHARE * asked));
+        [
+            (asked * asked - of_light * of_light).sqrt(),
+            INTERPOLATION_SHARE * asked,
+        ]
     }
 
     /// What is asked of the light on the patches.

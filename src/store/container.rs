@@ -49,8 +49,8 @@ impl FileKind {
     /// Raised whenever the body changes its meaning.
     fn version(self) -> u32 {
         match self {
-            Self::Checkpoint => 12,
-            Self::Cache => 13,
+            Self::Checkpoint => 13,
+            Self::Cache => 14,
         }
     }
 

@@ -61,13 +61,14 @@ class Truth:
         return float(np.sqrt(np.mean(self.noise[self.lit] ** 2)))
 
     def errors(self, xyz):
-        """What differs, as a dictionary of numbers; shares and relative errors in per cent."""
-        a, b = np.asarray(xyz)[self.lit], self.xyz[self.lit]
+        """What differs, as a dictionary of numbers; shares and relative errors in per cent. Points that are no numbers are left out."""
+        compared = self.lit & np.isfinite(xyz).all(axis=1)
+        a, b = np.asarray(xyz)[compared], self.xyz[compared]
         off = a[:, 1] / b[:, 1] - 1
-        square = np.mean(off**2) - self.rms_noise() ** 2
+        square = np.mean(off**2) - np.mean(self.noise[compared] ** 2)
         colour = de2000(a, b, self.white)
         return {
-            "points": int(self.lit.sum()),
+            "points": int(compared.sum()),
             "rel": 100 * np.sqrt(max(square, 0)),
             "bias": 100 * (a[:, 1].sum() / b[:, 1].sum() - 1),
             "median": 100 * float(np.median(off)),

@@ -202,3 +202,12 @@ def test_a_baked_file_is_drawn_between_its_vertices(written):
     found = light.irradiance(points, np.array([[0, 1, 0], [0, -1, 0]]))
     assert np.allclose(found[:, 0], 2 * 0.25) and np.allclose(found[:, 1], 0)
     assert np.allclose(found[:, 2], 2 * points[:, 2] / 2)
+
+
+def test_light_of_another_direction_is_not_compared(written):
+    changed = document()
+    attributes = changed["meshes"][0]["primitives"][0]["attributes"]
+    # Normals that lie in the floor.
+    attributes["_XYZ"] = attributes["NORMAL"] = 0
+    point, up = np.array([[0.5, 1e-4, 0.7]]), np.array([[0, 1, 0]])
+    assert np.isnan(Baked(written(changed)).irradiance(point, up)).all()
