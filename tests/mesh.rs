@@ -240,6 +240,20 @@ fn the_file_has_the_error_that_is_stated() {
         interpolation.is_met() && interpolation.rms > 0.0,
         "{interpolation:?}"
     );
+    // Between vertices there may be what light at points leaves, if no more than its own share of .8; of what light bends by .6.
+    let light = bake
+        .rounds()
+        .last()
+        .unwrap()
+        .error
+        .total_de2000
+        .value
+        .unwrap();
+    let asked = interpolation.allowed.hypot(light.min(0.8));
+    assert!(
+        (asked - 1.0).abs() < 1e-12 && (interpolation.may_bend - 0.6).abs() < 1e-12,
+        "{interpolation:?}"
+    );
     let reference = PathReference::new(&bake, 120, 4096, 3);
     let report = Report::of_file(&bake, &baked, &reference);
     let look = Exposure::auto(bake.scene(), &baked.surfaces);

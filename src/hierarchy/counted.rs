@@ -220,18 +220,21 @@ fn by_quarter(landings: &mut [LandingPoint]) -> [&mut [LandingPoint]; 4] {
 
 /// The density that half of all landings exceed; none without landings.
 fn usual(pieces: Vec<(f64, usize)>) -> Option<f64> {
-    let mut pieces: Vec<(f64, usize)> = (pieces.into_iter())
-        .filter(|&(area, count)| count > 0 && area > 0.0)
-        .map(|(area, count)| (count as f64 / area, count))
-        .collect();
-    pieces.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let half = pieces.iter().map(|piece| piece.1).sum::<usize>() / 2;
-    let mut passed = 0;
-    let middle = pieces.iter().find(|piece| {
-        passed += piece.1;
+    let pieces = (pieces.into_iter()).filter(|&(area, count)| count > 0 && area > 0.0);
+    median(pieces.map(|(area, count)| (count as f64 / area, count as f64)))
+}
+
+/// The number that those with half of all weight do not exceed, from numbers and their weights; none without weight.
+pub(crate) fn median(weighted: impl Iterator<Item = (f64, f64)>) -> Option<f64> {
+    let mut all: Vec<(f64, f64)> = weighted.collect();
+    all.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let half = 0.5 * all.iter().map(|(_, weight)| weight).sum::<f64>();
+    let mut passed = 0.0;
+    let middle = all.iter().find(|(_, weight)| {
+        passed += weight;
         passed > half
     });
-    middle.map(|piece| piece.0)
+    middle.map(|(number, _)| *number)
 }
 
 impl SplitSearch {

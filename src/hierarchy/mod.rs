@@ -13,7 +13,7 @@ mod spaces;
 mod tree;
 mod validate;
 
-pub(crate) use counted::{Counted, LandingPoint};
+pub(crate) use counted::{Counted, LandingPoint, median};
 pub use cut::{Cut, cuts};
 pub use halves::{Blocker, Outline};
 pub(crate) use mesh::Frame;

@@ -53,7 +53,7 @@ impl Default for MapLimits<'_> {
 pub(super) type NumberedLayer<'a> = (usize, &'a LayerLanes);
 
 impl Bake {
-    /// The light of the room in maps, whose interpolation error, measured, is within its share of the error asked for.
+    /// The light of the room in maps, whose error between texels, measured, is within what light at points leaves of the error asked for.
     /// `progress` is told (done, of) in looks of the present pass.
     pub fn light_maps(&self, limits: &MapLimits, progress: &dyn Fn(usize, usize)) -> LightMaps {
         let spaces = self.spaces();

@@ -59,7 +59,7 @@ pub(super) struct MeshGrowth<'a> {
     pub(super) most: usize,
     /// Is `most` a limit, or a rough number?
     pub(super) strict: bool,
-    /// Allowed mean error of light between vertices; triangles of the input are expected to have it until more is known of them.
+    /// By how much light may bend between vertices, in the mean; triangles of the input are expected to have it until more is known of them.
     pub(super) allowed: f64,
     /// Variance of a look by chance.
     pub(super) noise: f64,

@@ -25,7 +25,7 @@ pub(crate) const CHANCE: f64 = 4.0;
 /// Distinguishes these random numbers from others.
 const SEED: u64 = 0x0067_0f11;
 
-/// The interpolation error of a file, from its samples.
+/// The error of a file between its vertices or texels, from samples; `allowed`, `may_bend`: what its mean may be, and what light may bend by.
 pub(crate) fn summed(
     samples: &[ErrorSample],
     [allowed, may_bend]: [f64; 2],

@@ -82,8 +82,8 @@ impl Default for Limits<'_> {
 }
 
 impl Bake {
-    /// The mesh of the output with its light, grown until its interpolation error, measured, is within its share of the
-    /// error asked for. `progress` is told (done, of) in looks of the present pass.
+    /// The mesh of the output with its light, grown until its error between vertices, measured, is within what light at points leaves of the
+    /// error asked for, and what light bends by within its share. `progress` is told (done, of) in looks of the present pass.
     pub fn baked(&self, progress: &dyn Fn(usize, usize)) -> Baked {
         self.baked_within(&Limits::default(), progress)
     }

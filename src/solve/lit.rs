@@ -12,7 +12,8 @@ use crate::link::Sight;
 use rayon::prelude::*;
 
 /// Paths that tell whether anything is dark at all (a few milliseconds), and those that tell what is dark. With 1024 of the first a garage whose walls have outsides, 57 of
-/// 257 m2, was lit throughout; 65,536 of the others tell no more than 32,768 in it and in a home theatre within 2 %.
+/// 257 m2, was lit throughout; with 65,536 of the others 193 m2 of it are lit for 199 with 32,768, and
+/// 262 for 274 of a home theatre's 331.
 const PATHS: [u32; 2] = [4096, 32_768];
 /// Surfaces that a path meets: in closed rooms nearly all light has been everywhere by then.
 const BOUNCES: usize = 5;

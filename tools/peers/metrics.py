@@ -56,16 +56,16 @@ class Truth:
         """Median over the lit points of the relative standard error."""
         return float(np.median(self.noise[self.lit]))
 
-    def rms_noise(self):
-        """RMS over the lit points of the relative standard error."""
-        return float(np.sqrt(np.mean(self.noise[self.lit] ** 2)))
+    def rms_noise(self, points=None):
+        """RMS over some points, all lit ones unless told, of the relative standard error."""
+        return float(np.sqrt(np.mean(self.noise[self.lit if points is None else points] ** 2)))
 
     def errors(self, xyz):
         """What differs, as a dictionary of numbers; shares and relative errors in per cent. Points that are no numbers are left out."""
         compared = self.lit & np.isfinite(xyz).all(axis=1)
         a, b = np.asarray(xyz)[compared], self.xyz[compared]
         off = a[:, 1] / b[:, 1] - 1
-        square = np.mean(off**2) - np.mean(self.noise[compared] ** 2)
+        square = np.mean(off**2) - self.rms_noise(compared) ** 2
         colour = de2000(a, b, self.white)
         return {
             "points": int(compared.sum()),
