@@ -2,7 +2,7 @@
 
 use crate::common::built;
 
-use built::{Room, baked_to};
+use built::{Room, baked_to, estimate};
 use glam::{DVec3, dvec3};
 use haarlight::audit::{PathReference, Report};
 use haarlight::gather::Baked;
@@ -241,15 +241,7 @@ fn the_file_has_the_error_that_is_stated() {
         "{interpolation:?}"
     );
     // Between vertices there may be what light at points leaves, if no more than its own share of .8; of what light bends by .6.
-    let light = bake
-        .rounds()
-        .last()
-        .unwrap()
-        .error
-        .total_de2000
-        .value
-        .unwrap();
-    let asked = interpolation.allowed.hypot(light.min(0.8));
+    let asked = interpolation.allowed.hypot(estimate(&bake).min(0.8));
     assert!(
         (asked - 1.0).abs() < 1e-12 && (interpolation.may_bend - 0.6).abs() < 1e-12,
         "{interpolation:?}"

@@ -2,7 +2,7 @@
 
 use crate::common::built;
 
-use built::{Room, baked, extrapolated, faces, run, sun};
+use built::{Room, baked, estimate, extrapolated, faces, run, sun};
 use glam::{DVec3, dvec3};
 use haarlight::color::{KM, Observer};
 use haarlight::link::exchange;
@@ -376,10 +376,7 @@ fn adaptive_dense_and_reference_agree() {
             .sum();
         sum / a.len() as f64
     };
-    let claim = |bake: &Bake| {
-        let last = bake.rounds().last().unwrap();
-        last.error.total_de2000.value.unwrap() / 0.7
-    };
+    let claim = |bake: &Bake| estimate(bake) / 0.7;
     let seen = bakes.map(|bake| {
         bake.probe(&points)
             .iter()

@@ -15,7 +15,7 @@
 //! | `facts` | the room: see [`Facts`], units in the names |
 //! | `settings` | see [`SettingsRecord`] |
 //! | `warnings` | what the user should know of the room, sentences |
-//! | `averages` | what errors are averaged over: `over` in words, `counted_m2` of `area_m2` (see [`Averages`]). Area counts in full where light of the lamps, followed from surface to surface, lands at least a fiftieth as densely as usual, in proportion where less, and where none lands not at all; and in full where at least an eighth of what it faces is an eighth as far away as things in the room usually are from each other, in proportion where less: nobody looks into a gap |
+//! | `averages` | what errors are averaged over: `over` in words, `counted_m2` of `area_m2` (see [`Averages`]). Area counts in full where light of the lamps, followed from surface to surface, lands at least a fiftieth as densely as usual, in proportion where less, and where none lands not at all. Of that counts all where at least an eighth of what the area faces is an eighth as far away as things in the room usually are from each other, or further, and in proportion where less: nobody looks into a gap |
 //!
 //! Then for each round `{"record": "round", ...}` ([`Round`]):
 //!

@@ -60,6 +60,12 @@ pub(crate) fn run(scene: Scene, settings: Settings) -> Bake {
     bake
 }
 
+/// The mean error of light at points that a bake states after its last round, CIEDE2000.
+pub(crate) fn estimate(bake: &Bake) -> f64 {
+    let last = bake.rounds().last().unwrap();
+    last.error.total_de2000.value.unwrap()
+}
+
 /// The mesh of a bake with no more vertices than these, but for those of the input.
 pub(crate) fn baked_within(vertices: usize, bake: &Bake) -> Baked {
     let limits = Limits {

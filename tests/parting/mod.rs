@@ -8,7 +8,7 @@ use crate::common::built;
 use crate::common::every_effect::{EFFECTS, small};
 use crate::report::three;
 
-use built::{Room, baked_within, run};
+use built::{Room, baked_within, estimate, run};
 use glam::{DVec3, dvec3};
 use haarlight::color::de2000;
 use haarlight::error::Error;
@@ -188,12 +188,6 @@ fn layers_at_vertices_add_up_in_all_kinds_of_rooms() {
     holds("all effects", 3, &glanced(small(&EFFECTS)));
 }
 
-/// The mean error that a bake states.
-fn stated(bake: &Bake) -> f64 {
-    let last = bake.rounds().last().unwrap();
-    last.error.total_de2000.value.unwrap()
-}
-
 /// The room of [`two_lamps`] with one lamp; all others are taken away.
 fn alone(name: &str) -> Scene {
     let mut alone = two_lamps();
@@ -261,7 +255,7 @@ fn a_layer_is_the_room_under_its_lamp_alone() {
         }
         assert!(count > 400, "{name}: {count}");
         let [off, lack] = [off, lack].map(|sum| sum / f64::from(count));
-        let allowed = stated(&whole) + stated(&alone);
+        let allowed = estimate(&whole) + estimate(&alone);
         assert!(off <= allowed, "{name}: {off}, and {allowed} are stated");
         assert!(allowed < lack, "{name}: {allowed} hides {lack}");
     }

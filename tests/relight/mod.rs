@@ -2,6 +2,7 @@
 
 mod glass;
 
+use crate::common::built::estimate;
 use crate::common::every_effect::small;
 use crate::common::garbled;
 
@@ -168,16 +169,6 @@ fn measured_and_stated(cached: &Cached, relit: &Relit, fresh: &Bake) -> [f64; 2]
     let same = difference(&cached.bake, &cached.baked, 1);
     let measured = difference(fresh, &relit.baked, 1);
     [measured, stated.hypot(estimate(fresh)).hypot(same)]
-}
-
-fn estimate(bake: &Bake) -> f64 {
-    bake.rounds()
-        .last()
-        .unwrap()
-        .error
-        .total_de2000
-        .value
-        .unwrap()
 }
 
 /// Nothing changed: the bake to rounding, on the same mesh. There is no ray index, so a ray would see everything.
