@@ -14,7 +14,7 @@ use glam::{DVec3, Vec3};
 /// What bright patches that bring less than a tolerance each may err by together if they are left to rays, in tolerances of a point; by a bound that is about three times
 /// what those of a gallery lit by coves were measured to err by. While all of them were left to rays, chance at its points grew with the fineness of its links, from .48
 /// dE00 in the third round to .79 and .94 in the fourth (two seeds), of 3 million links, and `--error 1` was not reached. With 32 and 16 the light of that round is stated
-/// to be off by .67 and .48, with another seed by .81 and .52. With 16 a garage takes 1.16 times the CPU time; with 32 what is stated between vertices (another seed) is
+/// to be off by .67 and .48, with another seed by .81 and .52. With 16 a garage takes 1.16 to 1.3 times the CPU time; with 32 what is stated between vertices (another seed) is
 /// .63 for .69 there, .62 for .66 in a home theatre, .63 for .64 in a living room and .37 for .42 in a sunlit room, in 1.09 to 1.25 times the time.
 const LEFT_TO_RAYS: f64 = 16.0;
 
