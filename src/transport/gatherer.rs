@@ -98,8 +98,6 @@ pub struct Memory {
     pub(super) near: Vec<(u32, Hit)>,
     /// Lamps or bright patches held back until all of them are known.
     pub(super) sources: Vec<SourceElement>,
-    /// Bright patches that bring little, and a bound of the variance of brightness by each if it is left to rays.
-    pub(super) small: Vec<(Linked, f64)>,
     /// Far clusters of lamps, and what each brings at the most, share of white.
     pub(super) far: Vec<(u32, f64)>,
     /// Factors of the faces of lamps with many faces, lamp after lamp.
